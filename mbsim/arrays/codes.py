@@ -160,8 +160,10 @@ APPLIED_FORCE, APPLIED_TORQUE, STORED_ENERGY, LOST_POWER = 0, 3, 6, 7
     NEWTON,  # what Newton's iteration left of an implicit step
     FOLD,  # velocities across a fold behind it, over the usual ones
     DRIVES,  # energy that friction gave beyond what it took
-) = range(11)
-AUDITS = 11
+    PENETRATION,  # depth of rigid contacts
+    UNSOLVED_IMPULSES,  # what a step's contact problem is left unsolved by, as a velocity
+) = range(13)
+AUDITS = 13
 #: How many times what is explained friction may give, beyond which time and element are kept.
 DRIVES_LIMIT = 30.0
 # its columns, of the sample in which the value was largest over what was allowed

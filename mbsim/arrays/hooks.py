@@ -52,6 +52,7 @@ class Hook(IntEnum):
     ANGLES = 28  # turns of followed angles
     NEAR = 29  # the lists of near pairs
     REQUESTS = 30  # expressions of requests
+    STEPPING = 31  # no hook: where the packed arrays of `stepping.arrays` are
 
 
 class Contacts(IntEnum):

@@ -128,5 +128,8 @@ def command(model: str, overrides: tuple[str, ...], repair: bool) -> None:
         echo(f"  no Simulate: a run needs --end-time{more}")
     for line in sequence(deck):
         echo(f"  {line}")
-    for note in (*deck.notes, *notes):
+    from mbsim.stepping.refusals import serves_better
+
+    advice = [said] if (said := serves_better(deck)) else []
+    for note in (*deck.notes, *notes, *advice):
         echo(f"  note: {note}")

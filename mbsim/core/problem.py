@@ -40,6 +40,8 @@ to the committed one before the run ends, but for codes from AT_ONCE on.
 |         |                        | if a force may leave its branch and come back within it    |
 | happens | y, -                   | 1 if an event that is to be located has happened between   |
 |         |                        | the committed point and this one, else 0                   |
+| step    | y, y after (out)       | code; the state a step h after y, of a problem that owns   |
+|         |                        | its contacts; h < 0: -h after a y that is no committed one |
 | reject  | -, -   (h: reason)     | code; told of every rejected step                          |
 | commit  | y (in and out), f      | what follows from the step that is taken: a sum of `Taken` |
 | look    | y at an inner point, - | code; called where `inner` before asked for it             |
@@ -132,6 +134,7 @@ class Problem(NamedTuple):
     solve_pair: int = 0
     retract: int = 0  # this and the next only for methods that know positions from velocities
     difference: int = 0
+    step: int = 0  # only for problems that step with contacts of their own
 
 
 def addresses(hooks: Mapping[str, Callable[..., Any]]) -> dict[str, int]:

@@ -118,25 +118,39 @@ def natural_map(
 
 
 @jitable
-def bring_into_cones(tangent: tuple[int, ...], mu: Vector, r: Vector, out: Vector) -> None:
-    """Write r with pulls made 0 and friction cut to mu r_N.
+def bring_into_cones(
+    tangent: tuple[int, ...],
+    rolling: tuple[int, ...],
+    mu: Vector,
+    mu_r: Vector,
+    r: Vector,
+    out: Vector,
+) -> None:
+    """Write r with pulls made 0, friction cut to mu r_N and rolling friction to mu_r r_N.
 
     A method that keeps neither to the last bit leaves weak contacts outside by more than their own
     size allows.
     """
-    d = 1 + len(tangent)
+    nt, nr = len(tangent), len(rolling)
+    d = 1 + nt + nr
     for a in range(len(mu)):
         first = d * a
         normal = max(r[first], 0.0)
-        square = 0.0
-        for k in range(len(tangent)):
-            square += r[first + 1 + k] ** 2
-        keep = 1.0
-        if square > (mu[a] * normal) ** 2:
-            keep = mu[a] * normal / math.sqrt(square)
         out[first] = normal
-        for k in range(len(tangent)):
-            out[first + 1 + k] = keep * r[first + 1 + k]
+        _cut(nt, mu[a] * normal, r, first + 1, out)
+        if nr > 0:
+            _cut(nr, mu_r[a] * normal, r, first + 1 + nt, out)
+
+
+@jitable
+def _cut(many: int, bound: float, r: Vector, first: int, out: Vector) -> None:
+    """Write `many` numbers of r, shortened to a length of `bound`."""
+    square = 0.0
+    for k in range(first, first + many):
+        square += r[k] ** 2
+    keep = bound / math.sqrt(square) if square > bound**2 else 1.0
+    for k in range(first, first + many):
+        out[k] = keep * r[k]
 
 
 @jitable

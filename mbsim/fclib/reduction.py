@@ -24,6 +24,7 @@ from mbsim.fclib.blocks import (
     product_of_stored,
     transposed_product_of_stored,
 )
+from mbsim.fclib.bodies.detect import rigid_bodies
 from mbsim.fclib.clock import compiled
 from mbsim.fclib.condensation import condense, mass_solve
 from mbsim.fclib.equality import Equality, eliminate, split, upper_solution
@@ -38,7 +39,8 @@ class Blocks:
     """u = W r + q, W in blocks (`blocks.block_rows`), and how to get l and v from r.
 
     `tangent` and `rolling` are the tuples whose lengths compiled code looks at; `rho` (nc,) turns a
-    contact's velocity into the impulse that it is worth (`blocks.own_units`).
+    contact's velocity into the impulse that it is worth (`blocks.own_units`). `rigid`: of a global
+    problem of rigid bodies, what `bodies.detect.rigid_bodies` returns; its second part changes.
     """
 
     tangent: tuple[int, ...]
@@ -53,6 +55,7 @@ class Blocks:
     rho: Vector
     equality: Equality | None = None
     mass: tuple[Any, ...] | None = None
+    rigid: tuple[Any, ...] | None = None
 
     @cached_property
     def system(self) -> DelassusSystem:
@@ -129,6 +132,11 @@ def _reduce_global(problem: Global) -> Blocks:
         ptr, col, val = rows
     blocks = _blocks(problem, (ptr, col, val), q, equality)
     blocks.mass = mass
+    if p == 0:
+        tangent, rolling = directions(problem)
+        blocks.rigid = rigid_bodies(
+            tangent, rolling, _rows(problem.M), _rows(problem.H), q, blocks.mu, blocks.mu_r
+        )
     return blocks
 
 

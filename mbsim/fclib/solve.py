@@ -125,9 +125,9 @@ def solve(
     small = 0 < len(problem.mu) <= LONG
     if isinstance(problem, Local) and plain and small and solver == "AUTO":
         return _solve_plain(problem, tol, r, strict, began, max_seconds)
-    with loading():
-        method = named(solver, rolling=problem.mu_r is not None)
     blocks = reduce(problem)
+    with loading():
+        method = named(solver, rolling=problem.mu_r is not None and blocks.rigid is None)
     condensed = clock()
     task = Task(blocks, r, tol, tol, strict, began + max_seconds)
     error, error_q = task.look(r)

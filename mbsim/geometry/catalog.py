@@ -75,6 +75,7 @@ class Region(NamedTuple):
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 PAIRS: Registry[Pair] = Registry("mbsim.geometry.pairs")
+NEARS: Registry[Callable[..., int]] = Registry("mbsim.geometry.pairs")
 REGIONS: Registry[Region] = Registry("mbsim.geometry.pairs")
 
 
@@ -97,6 +98,20 @@ def region(shape_i: str, shape_j: str, whole: float) -> Callable[[Kernel], Kerne
     def register(function: Kernel) -> Kernel:
         REGIONS.put(f"{shape_i}-{shape_j}", Region(jitable(function), whole))
         return function
+
+    return register
+
+
+def near_pair(shape_i: str, shape_j: str) -> Callable[[Kernel], Kernel]:
+    """Register the decorated function as what gives the points of a pair that is apart too.
+
+    Its rows are those of the pair's `points`; a row that is no point has weight 0. The others'
+    depth, where negative, is the distance of two features that may meet, along their normal.
+    """
+
+    def register(points: Kernel) -> Kernel:
+        NEARS.put(f"{shape_i}-{shape_j}", jitable(points))
+        return points
 
     return register
 

@@ -15,7 +15,10 @@ SCHEMES = {
     "VERLET": "explicit, order 2, one evaluation a step within its stability bound",
     "GALPHA": "implicit, order 2, for stiff contact and mechanisms",
     "RADAU5": "implicit, order 5, for stiff equations and accuracy",
+    "MOREAU": "nonsmooth time stepping, order 1, rigid contacts with exact Coulomb friction",
 }
+#: The method whose contacts are rigid: the problem steps, in `mbsim.stepping`.
+RIGID = "MOREAU"
 
 #: Those that solve for the end of a step.
 IMPLICIT_METHODS = ("GALPHA", "RADAU5")
@@ -28,8 +31,9 @@ METHODS = {
 }
 
 
-def load(name: str) -> Scheme:
-    """Return the method of that name."""
-    module = importlib.import_module(f"mbsim.integrators.{name.lower()}")
-    scheme: Scheme = module.SCHEME
+def load(name: str, fixed: bool = False) -> Scheme:
+    """Return the method of that name; of the rigid one that of a `fixed` step, where it is."""
+    package = "stepping" if name == RIGID else "integrators"
+    module = importlib.import_module(f"mbsim.{package}.{name.lower()}")
+    scheme: Scheme = module.FIXED_SCHEME if fixed else module.SCHEME
     return scheme

@@ -142,7 +142,7 @@ class Method(NamedTuple):
 class Workspace(NamedTuple):
     """What stands behind the context of a method's two functions."""
 
-    problem: I1  # (22,) the fields of `Problem`
+    problem: I1  # (23,) the fields of `Problem`
     method: Method
 
 
@@ -210,7 +210,7 @@ def in_workspace(context: int) -> tuple[Problem, Method]:
     w = workspace.problem
     first = (w[0], w[1], w[2], w[3], w[4], w[5], w[6])
     second = (w[7], w[8], w[9], w[10], w[11], w[12], w[13])
-    third = (w[14], w[15], w[16], w[17], w[18], w[19], w[20], w[21])
+    third = (w[14], w[15], w[16], w[17], w[18], w[19], w[20], w[21], w[22])
     return Problem(*(first + second + third)), workspace.method
 
 

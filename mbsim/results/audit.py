@@ -99,6 +99,20 @@ ENTRIES = (
         codes.DRIVES_LIMIT,
         "friction",
     ),
+    Judged(
+        codes.PENETRATION,
+        "penetration",
+        "rigid shapes go {value:.3g} deep into each other",
+        10.0,
+        "contact",
+    ),
+    Judged(
+        codes.UNSOLVED_IMPULSES,
+        "contact_residual",
+        "the contact problem of a step is solved to a velocity of {value:.3g} only",
+        10.0,
+        "",
+    ),
 )
 #: Those of energy.
 ENERGIES = ("energy", "energy_step")

@@ -74,12 +74,13 @@ class Runner:
         self._advance, self.methods = jit.planned(
             lambda: (
                 jit.awaited(driver.advance),
-                Methods(system, settings.integrator, start, timed),
+                Methods(system, settings.integrator, start, timed, settings.fixed, settings.tol),
             )
         )
         if profile.running is not None:
             self._advance = profile.running.loop(self._advance)
         self._warn_of_states()
+        self.methods.tell(self.log.line)
         self.timetable: Timetable
         self.method, self.problem = self.methods.arrays, self.methods.problem
         self.hooks = HookCalls(system, self.problem, self.detector)
@@ -102,7 +103,7 @@ class Runner:
         """Say of subroutines with states that VERLET holds their friction back."""
         contacts = self.system.scene.contacts
         for id, numbers in zip(self.system.contact_ids, contacts.memory, strict=True):
-            if numbers > 0 and self.methods.explicit.order == 0.0:
+            if numbers > 0 and self.settings.integrator == "VERLET":
                 self._say(
                     f"Force_Contact[{id}]: VERLET holds friction back to a quarter of what would "
                     "stop the slip in a step: what its subroutine holds by states creeps"
@@ -179,6 +180,8 @@ class Runner:
         folder = self.recorder.directory
         if folder is None:
             raise ModelError("dump_fclib needs an output folder")
+        if self.methods.rigid is not None:
+            raise ModelError("dump_fclib writes problems of compliant contacts, not of MOREAU's")
         idle = np.zeros(len(self.method.y))
 
         def evaluate(t: float, y: Any) -> float:

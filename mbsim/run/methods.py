@@ -11,7 +11,7 @@ import numpy as np
 from mbsim.arrays.codes import AUDIT_EVERY
 from mbsim.compile_model import tangent
 from mbsim.compile_model.tangent import MOST_BODIES as MOST_LINEARISED
-from mbsim.core import jit, profile
+from mbsim.core import jit, profile, tags
 from mbsim.dynamics.bodies import configuration
 from mbsim.errors import ModelError
 from mbsim.integrators import catalog, scheme
@@ -49,13 +49,20 @@ class Methods:
     AUTO's two methods have their arrays in common, so that one goes on where the other ends.
     """
 
-    def __init__(self, system: System, name: str, start: float, timed: bool = False) -> None:
+    def __init__(
+        self,
+        system: System,
+        name: str,
+        start: float,
+        timed: bool = False,
+        fixed: bool = False,
+        tol: float = 1e-5,
+    ) -> None:
         from mbsim.compile_model.timetable import ROWS
-        from mbsim.dynamics.pipeline.problem import mechanism
 
         self.system = system
         changing = name == catalog.AUTO
-        self.explicit = catalog.load(catalog.EXPLICIT if changing else name)
+        self.explicit = catalog.load(catalog.EXPLICIT if changing else name, fixed)
         self.other = catalog.load(catalog.IMPLICIT) if changing else None
         bodies = len(system.body_ids)
         held = scheme.both(self.explicit, self.other) if self.other else self.explicit
@@ -69,10 +76,21 @@ class Methods:
         self.arrays.memory[scheme.OWN_TIME] = length / speed
         if system.scene.contacts.rigid.any() or (system.scene.applied.equation >= 0).any():
             self.arrays.memory[scheme.LEFT_PART] = LEFT_OF_STICKING
-        fixed = self.explicit.order == 0.0
-        system.scene.world.fixed_step[0] = int(fixed)
         self.problem: Problem
-        self.problem, self._table = mechanism(system.scene, fixed)
+        self.rigid: Any = None  # what a method with rigid contacts has of its own
+        self._table: Any
+        if name == catalog.RIGID:
+            from mbsim.stepping.setup import rigid_mechanism
+
+            self.rigid = rigid_mechanism(system, fixed, tol)
+            self.problem = self.rigid.problem
+        else:
+            from mbsim.dynamics.pipeline.problem import mechanism
+
+            # a method without error estimate
+            bounded = self.explicit.order == 0.0
+            system.scene.world.fixed_step[0] = int(bounded)
+            self.problem, self._table = mechanism(system.scene, bounded)
         self._tangent: Any = None
         self.steps: scheme.Steps
         if self.explicit.implicit and bodies > MOST_LINEARISED:
@@ -91,6 +109,11 @@ class Methods:
         #: Evaluations by AUTO's implicit method before that, and all of them by then.
         self._spent = (0, 0)
         self.bind()
+
+    def tell(self, say: Callable[[str], None]) -> None:
+        """Say what a method with rigid contacts reads of them."""
+        for line in self.rigid.said if self.rigid is not None else ():
+            say(line)
 
     @property
     def is_stiff(self) -> bool:
@@ -144,6 +167,8 @@ class Methods:
         }
         if self.steps.implicit:
             kept |= tangent.saved(self._tangent[0])
+        if self.rigid is not None:
+            kept |= tags.copies(self.rigid.stepping, tags.STATE, "stepping/")
         return kept
 
     def restore(self, kept: Mapping[str, Any]) -> None:
@@ -154,6 +179,8 @@ class Methods:
         self.bind()
         if self.steps.implicit:
             tangent.restore(self._tangent[0], kept)
+        if self.rigid is not None:
+            tags.put_back(self.rigid.stepping, tags.STATE, kept, "stepping/")
 
     def _forget(self) -> None:
         """Leave nothing of a linearisation to what comes later: only a running one is saved."""

@@ -21,6 +21,7 @@ import numpy as np
 from mbsim.arrays.codes import USED_INCIDENTS
 from mbsim.core.stored import read_regular
 from mbsim.errors import ModelError
+from mbsim.integrators.catalog import RIGID
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
@@ -110,6 +111,11 @@ class Replay:
         from mbsim.run.settings import settle
 
         named = results.attributes
+        if named["integrator"] == RIGID:
+            raise ModelError(
+                f"{results.path}: integrator {RIGID} has no contact law to be asked again; what "
+                "contacts did is in the file: contacts/<id>/force"
+            )
         if "overrides" not in named:
             raise ModelError(f"{results.path}: an earlier version made it: run the model again")
         model = read_model(_deck(results), _lines(named["overrides"]))

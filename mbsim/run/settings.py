@@ -11,7 +11,14 @@ import numpy as np
 
 from mbsim.errors import ModelError
 from mbsim.forces.catalog import FORCES, Components, Expressed, Form, OfResidual, Switched
-from mbsim.integrators.catalog import AUTO, EXPLICIT, IMPLICIT, IMPLICIT_METHODS, METHODS
+from mbsim.integrators.catalog import (
+    AUTO,
+    EXPLICIT,
+    IMPLICIT,
+    IMPLICIT_METHODS,
+    METHODS,
+    RIGID,
+)
 from mbsim.model.elements import ASIDE, Model, Simulation
 from mbsim.model.forces import rigid_forces
 from mbsim.model.names import element_name, is_adams
@@ -62,6 +69,11 @@ class Settings:
     def end_time(self) -> float:
         """End of the last simulation [T]."""
         return self.stages[-1].simulation.end_time
+
+    @property
+    def fixed(self) -> bool:
+        """Whether steps are as long as the deck says: of MOREAU, where h_min is h_max."""
+        return self.integrator == RIGID and any(s.h_min == s.h_max for s in self.stages)
 
     @property
     def tol(self) -> float:
@@ -250,7 +262,7 @@ def _for_rigid_friction(model: Model, method: str) -> tuple[str, list[str]]:
     """
     contact = next((c for c in model.contacts.values() if c.rigid), None)
     dry = next(iter(rigid_forces(model)), None)
-    if (contact is None and dry is None) or method in IMPLICIT_METHODS:
+    if (contact is None and dry is None) or method in (*IMPLICIT_METHODS, RIGID):
         return method, []
     if contact is not None:
         source, name = contact.source, element_name(model.file, "Force_Contact", contact.id)
@@ -311,6 +323,15 @@ def settle(
     method, said_of_names = _method(asked)
     if method == "VERLET":
         _refuse_verlet(model)
+    if method == RIGID:
+        from mbsim.stepping.refusals import refuse
+
+        refuse(model)
+        if len({stage.h_min == stage.h_max for stage in stages}) > 1:
+            raise ModelError(
+                f"{model.file}: Param_Transient: integrator MOREAU takes steps of a fixed length "
+                "where h_min is h_max: in all Simulates of a deck, or in none"
+            )
     method, said_of_friction = _for_rigid_friction(model, method)
     notes += said_of_friction
     settings = Settings(tuple(stages), method, (*notes, *said_of_names))

@@ -247,7 +247,7 @@ def _run(model: Model, options: Options) -> Results:
         recorder.abandon()
         raise
     log = RunLog(system, attributes, recorder.directory, options.resume)
-    for note in (*said, *settings.notes):
+    for note in (*said, *settings.notes, *_advice(model, settings)):
         log.line(note)
     if system.user_laws or system.subroutines or system.posts:
         from mbsim.plugins import host
@@ -287,6 +287,15 @@ def _run(model: Model, options: Options) -> Results:
             results = _finish(runner, status, time.perf_counter() - began, compiled)
     assert results is not None  # a finished run has rows
     return results
+
+
+def _advice(model: Model, settings: Settings) -> list[str]:
+    """Return what AUTO says of another method that would serve better."""
+    from mbsim.integrators.catalog import AUTO
+    from mbsim.stepping.refusals import serves_better
+
+    said = serves_better(model) if settings.integrator == AUTO else ""
+    return [said] if said else []
 
 
 def _goes_on(runner: Runner) -> None:

@@ -35,4 +35,4 @@ def counters(scene: Scene, methods: Methods) -> dict[str, float]:
         "python_calls": int(counters[codes.PYTHON_CALLS]),
         "h_smallest": float(memory[scheme.H_SMALLEST]),
         "h_largest": float(memory[scheme.H_LARGEST]),
-    }
+    } | (methods.rigid.counters() if methods.rigid is not None else {})

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from mbsim.fclib.bodies.proximal import all_contacts_work
 from mbsim.fclib.clock import compiled
 from mbsim.fclib.cone import count_changes
 from mbsim.fclib.factor import factor_work
@@ -128,7 +129,7 @@ def run(task: Task) -> None:
         return
     costs = _costs(task)
     phases = NewtonPhases(task, costs.newton)
-    if task.blocks.rolling:
+    if task.blocks.rolling and task.blocks.rigid is None:
         _rolling(task, costs, phases)
     else:
         _solve(task, costs, phases)
@@ -143,7 +144,8 @@ def _solve(task: Task, costs: Costs, phases: NewtonPhases) -> None:
     _sweep(task, BEGIN, phases)
     finish = FINISH * costs.newton
     far = max(SETTLED, task.tol)
-    if not task.over and task.blocks.contacts >= STACKS and task.error > far:
+    stacks = task.blocks.contacts >= STACKS and task.blocks.rigid is None
+    if not task.over and stacks and task.error > far:
         trial = BEGIN + costs.factor + 2.0 * RESTED * costs.splitting
         _sweep(task, trial, phases)
         phases.run(trial)
@@ -160,6 +162,8 @@ def _solve(task: Task, costs: Costs, phases: NewtonPhases) -> None:
 def _costs(task: Task) -> Costs:
     """Estimate what the methods cost."""
     b = task.blocks
+    if b.rigid is not None:
+        return Costs(compiled(all_contacts_work)(*b.rigid), math.inf, math.inf)
     d = 1 + len(b.tangent) + len(b.rolling)
     flops, entries = compiled(elimination_cost)(b.contacts, b.ptr, b.col, d)
     factor = factor_work(flops, len(b.col))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbsim.fclib.bodies.proximal import proximal_bodies
 from mbsim.fclib.clock import compiled
 from mbsim.fclib.solvers.proximal import (
     ALPHA,
@@ -125,9 +126,16 @@ class Proximal:
         task = self.task
         r = self.r.copy()
         history = np.empty((ROWS, 3))
-        rows = compiled(proximal_newton)(
-            task.blocks.system, r, self.centre, self.state, task.goal, limit, history
-        )
+        b = task.blocks
+        if b.rigid is None:
+            rows = compiled(proximal_newton)(
+                b.system, r, self.centre, self.state, task.goal, limit, history
+            )
+        else:
+            rows, matrix = compiled(proximal_bodies)(
+                *b.rigid, r, self.centre, self.state, task.goal, limit, history
+            )
+            b.rigid = (b.rigid[0], matrix)
         self.r = r
         return history[:rows]
 

@@ -141,7 +141,7 @@ def _newton_iterations(
 
 
 @jitable
-def _keep_best(
+def keep_best(
     state: Vector, goal: Goal, error: float, error_q: float, trial: Vector, r: Vector
 ) -> None:
     """Take the trial impulses as the best iterate if they are, and count steps without gain."""
@@ -155,7 +155,7 @@ def _keep_best(
 
 
 @jitable
-def _move_centre(
+def move_centre(
     state: Vector, centre: Vector, x: Vector, good: bool, newtons: int, error: float
 ) -> bool:
     """Move the centre to or beyond x, and change alpha; return whether to go on.
@@ -246,10 +246,10 @@ def proximal_newton(
         state[NEWTONS] += newtons
         state[STEPS] += 1
         # the error of the problem itself
-        bring_into_cones(system.tangent, system.mu, x, trial)
+        bring_into_cones(system.tangent, system.rolling, system.mu, system.mu_r, x, trial)
         error, error_q = errors_at(system, trial, plain, DECIDING, work.room)
         rows = record(history, rows, state[NEWTONS], error, error_q)
-        _keep_best(state, goal, error, error_q, trial, r)
+        keep_best(state, goal, error, error_q, trial, r)
         if finishing or state[PHASE] > 0.0:
             break
         if error <= tol and error_q <= tol_q:
@@ -259,6 +259,6 @@ def proximal_newton(
                 break
             finishing = True
             centre[:] = x
-        elif not _move_centre(state, centre, x, good, newtons, error):
+        elif not move_centre(state, centre, x, good, newtons, error):
             break
     return rows

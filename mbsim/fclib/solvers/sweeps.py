@@ -17,6 +17,7 @@ from mbsim.fclib.blocks import (
     product,
     product_of_stored,
 )
+from mbsim.fclib.bodies.sweeps import sweep_system
 from mbsim.fclib.clock import compiled, late
 from mbsim.fclib.cone import (
     DECIDING,
@@ -332,9 +333,15 @@ def nsgs(task: Task, sweeps: int, every: int = 5, start: Vector | None = None) -
     b = task.blocks
     r: Vector = (task.r if start is None else start).copy()
     history = np.empty((min(ROWS, sweeps // every + 2), 3))
-    done, error, error_q, rows = compiled(gauss_seidel)(
-        b.system, r, task.goal, sweeps, every, history
-    )
+    if b.rigid is None:
+        done, error, error_q, rows = compiled(gauss_seidel)(
+            b.system, r, task.goal, sweeps, every, history
+        )
+    else:
+        system, bodies = b.rigid
+        done, error, error_q, rows = compiled(sweep_system)(
+            system, len(bodies.number), r, task.goal, sweeps, every, history
+        )
     history[:rows, 0] += task.iterations
     task.iterations += done
     task.work += done * sweep_work(b)
@@ -345,6 +352,8 @@ def nsgs(task: Task, sweeps: int, every: int = 5, start: Vector | None = None) -
 
 def sweep_work(b: Blocks) -> float:
     """Return the estimated seconds of a sweep."""
+    if b.rigid is not None:
+        return (1e-5 if b.rolling else 9e-8) * b.contacts
     if b.rolling:
         return 1e-5 * b.contacts + 2e-8 * len(b.col)
     if len(b.tangent) == 1:

@@ -31,7 +31,7 @@ import numpy as np
 from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
-from mbsim.geometry.catalog import axis, pair, put_couple, put_point, region
+from mbsim.geometry.catalog import axis, near_pair, pair, put_couple, put_point, region
 from mbsim.geometry.crossing import (
     EDGES_MEET,
     FACE_OF_I,
@@ -366,6 +366,23 @@ def _box_on_box(
 def box_box(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """The common polygon of two faces; apart, the largest gap along a face's or edges' axis."""
     _box_on_box(frame_i, size_i, frame_j, size_j, points, False)
+    return BOX_BOX_SLOTS
+
+
+@near_pair("BOX", "BOX")
+def box_box_near(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
+    """The common polygon of two faces, also where the boxes are apart along an axis."""
+    s = np.empty(_OVERLAP + _AXES)
+    _relative_pose(frame_i, frame_j, s)
+    _face_overlaps(size_i, size_j, s)
+    _edge_overlaps(size_i, size_j, s)
+    best = _least(s)
+    n = _direction(s, best)
+    j0, j1, j2 = axis(frame_j, 0), axis(frame_j, 1), axis(frame_j, 2)
+    normal = add(scale(n[0], j0), add(scale(n[1], j1), scale(n[2], j2)))
+    for row in range(BOX_BOX_SLOTS):
+        put_point(points[row], s[_OVERLAP + best], vector(frame_j), normal, 0.0)
+    _manifold(frame_j, size_i, size_j, s, best, n, points, False)
     return BOX_BOX_SLOTS
 
 

@@ -1,0 +1,1 @@
+"""Problems of rigid bodies solved in the bodies' velocities, six unknowns a body."""

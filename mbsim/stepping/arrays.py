@@ -1,0 +1,186 @@
+"""Arrays of nonsmooth time stepping, made only where a run steps so.
+
+Counts: nb bodies (row nb is ground), nc contacts, m contact points that a step may have. Velocities
+and wrenches are spatial vectors (linear, angular about the cg), global axes. r is an impulse along
+(n, x, y) of a contact point, on I; u = H v the velocity of I relative to J there.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mbsim.core import tags
+from mbsim.core.arrays import F1, F2, F3, F4, I1, I2
+
+#: Speeds at which a coefficient of friction is tabled, and the step of their logarithm's base 2.
+SPEEDS = 64
+# entries of `Rules.number`, of each contact: slip speed of the table's first entry, coefficient
+# where it sticks, restitution, closing speed below which there is none
+FIRST_SPEED, STICKING, RESTITUTION, SLOWEST = range(4)
+RULE_NUMBERS = 4
+# entries of `Kept.table`: a contact point of the last step that was taken; force is on I's body
+(
+    KEPT_CONTACT,
+    KEPT_SLOT,
+    KEPT_KIND,
+    KEPT_GRAPHIC_I,  # in the pair's order, as of `Pairs`
+    KEPT_GRAPHIC_J,
+    KEPT_BODY_I,  # in the contact's order, as all that follows
+    KEPT_BODY_J,
+    KEPT_GAP,  # at the step's begin
+    KEPT_CLOSING,  # speed before it
+    KEPT_SLIP,  # behind it
+    KEPT_STICKS,  # 1 where nothing slipped
+    KEPT_WEIGHT,
+    KEPT_ROW,
+    KEPT_STAYS,  # 1 where a point of the step at hand is the same one
+) = range(14)
+KEPT_POINT, KEPT_NORMAL, KEPT_TANGENT, KEPT_FORCE = 14, 17, 20, 23
+KEPT_COLUMNS = 26
+# entries of `Plan.number`: 1 where the error of steps is not estimated; lengths below which gaps
+# and changes of position do not count; what the solver may leave of a velocity, times h
+FIXED, SLOP, LEFT = range(3)
+PLAN_NUMBERS = 3
+# entries of `Tally.number`, of the last step tried: what the solver left, as a velocity; its length
+RESIDUAL, STEP_LENGTH = range(2)
+TALLY_NUMBERS = 2
+# entries of `Tally.count`: contact points, points that press, sweeps so far, steps tried so far,
+# steps that were left unsolved, steps with positions projected, Newton iterations so far
+POINTS, PRESSING, ALL_SWEEPS, ALL_STEPS, UNSOLVED, PROJECTED, NEWTONS, ALL_POINTS = range(8)
+TALLY_COUNTS = 8
+
+
+@tags.constant
+class Rules(NamedTuple):
+    """What a Force_Contact says of rigid contact."""
+
+    number: F2  # (nc, RULE_NUMBERS)
+    curve: F2  # (nc, SPEEDS) coefficient of friction, by slip speed
+
+
+@tags.constant
+class Plan(NamedTuple):
+    """What holds for a whole run."""
+
+    number: F1  # (PLAN_NUMBERS,)
+    near: I1  # (nk,) 1 where rows of a kind of pair that are apart are points of contact
+    rows: I1  # (nk,) rows of a kind of pair, from its first slot on
+
+
+@tags.scratch
+class Motion(NamedTuple):
+    """Bodies in a step."""
+
+    inverse: F3  # (nb, 6, 6) of the mass
+    before: F2  # (nb + 1, 6) velocity at the step's begin
+    free: F2  # (nb + 1, 6) at its end, were there no contacts
+    v: F2  # (nb + 1, 6) with them
+    shift: F2  # (nb + 1, 6) displacement over the step's length
+    part: F1  # (nb + 1,) of `before` in that, the rest being v's
+    reach: F1  # (ng,) how far a graphic may come in the step
+    slope: F1  # (ny,) y'
+
+
+@tags.scratch
+class Points(NamedTuple):
+    """Contact points that a step looks at, in the order of their slots."""
+
+    slot: I1  # (m,)
+    contact: I1  # (m,)
+    body: I2  # (m, 2) I's and J's
+    key: I1  # (m,) of its pair of graphics, whose points follow each other
+    row: I1  # (m,) of the pair
+    was: I1  # (m,) row of `Kept` that is the same point, -1 for none
+    gap: F1  # (m,)
+    point: F2  # (m, 3)
+    normal: F2  # (m, 3)
+    tangent: F2  # (m, 3)
+    H: F4  # (m, 2, 3, 6) velocity along (n, x, y) by those of the bodies
+    answer: F4  # (m, 2, 6, 3) velocities of the bodies by r
+    W: F3  # (m, 3, 3) u by r
+    mu: F1  # (m,)
+    ahead: F1  # (m,) u_n + ahead >= 0 where the point closes
+    closing: F1  # (m,) u_n before the step
+    r: F2  # (m, 3)
+    old: F2  # (m, 3) r before the sweep at hand
+    way: F2  # (m, 3) of the sweeps so far
+    push: F1  # (m,) what projected positions
+
+
+@tags.state
+class Kept(NamedTuple):
+    """Contact points that pressed in the last step that was taken."""
+
+    count: I1  # type: ignore[assignment]  # (1,)
+    key: I1  # (m,)
+    table: F2  # (m, KEPT_COLUMNS)
+    table_of_keys: tags.Scratch[I1]  # (2^k,) of the hash table of keys: 1 + first row, 0 for none
+
+
+@tags.state
+class Tally(NamedTuple):
+    """What is counted, and what the last step left unsolved."""
+
+    number: F1  # (TALLY_NUMBERS,)
+    count: I1  # type: ignore[assignment]  # (TALLY_COUNTS,)
+
+
+class Stepping(NamedTuple):
+    """All of it."""
+
+    rules: Rules
+    plan: Plan
+    motion: Motion
+    points: Points
+    kept: Kept
+    tally: Tally
+
+
+def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int]) -> Stepping:
+    """Return empty arrays for so many bodies, graphics, numbers of y and contact points."""
+    nb, ng, ny, m = sizes
+
+    def whole(*shape: int) -> np.ndarray:
+        return np.zeros(shape, dtype=np.int64)
+
+    def numbers(*shape: int) -> np.ndarray:
+        return np.zeros(shape)
+
+    motion = Motion(
+        inverse=numbers(nb, 6, 6),
+        before=numbers(nb + 1, 6),
+        free=numbers(nb + 1, 6),
+        v=numbers(nb + 1, 6),
+        shift=numbers(nb + 1, 6),
+        part=numbers(nb + 1),
+        reach=numbers(ng),
+        slope=numbers(ny),
+    )
+    points = Points(
+        slot=whole(m),
+        contact=whole(m),
+        body=whole(m, 2),
+        key=whole(m),
+        row=whole(m),
+        was=whole(m),
+        gap=numbers(m),
+        point=numbers(m, 3),
+        normal=numbers(m, 3),
+        tangent=numbers(m, 3),
+        H=numbers(m, 2, 3, 6),
+        answer=numbers(m, 2, 6, 3),
+        W=numbers(m, 3, 3),
+        mu=numbers(m),
+        ahead=numbers(m),
+        closing=numbers(m),
+        r=numbers(m, 3),
+        old=numbers(m, 3),
+        way=numbers(m, 3),
+        push=numbers(m),
+    )
+    room = 1 << max(4, int(4 * m - 1).bit_length())
+    kept = Kept(whole(1), whole(m), np.zeros((m, KEPT_COLUMNS)), whole(room))
+    tally = Tally(np.zeros(TALLY_NUMBERS), whole(TALLY_COUNTS))
+    return Stepping(rules, plan, motion, points, kept, tally)

@@ -1,0 +1,89 @@
+"""What a run with rigid contacts judges itself by, at every step that is taken.
+
+* what the solver left: the change of a velocity that one more sweep would make, over what it may
+  be by the tolerance;
+* penetration at the step's begin;
+* friction over mu N;
+* residuals of constraints and their rates.
+
+The energy balance is no measure: impacts take energy, and what they take is found by the same
+velocities.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.codes import (
+    AUDIT_EVERY,
+    AUDIT_TOL,
+    CONE,
+    LARGEST_FRICTION,
+    PENETRATION,
+    STEPS_ALL,
+    STEPS_SINCE,
+    UNSOLVED_IMPULSES,
+    USUAL_ENERGY,
+)
+from mbsim.arrays.hooks import Hook, Joints, note_failure
+from mbsim.arrays.scene import Scene
+from mbsim.core.address import call_int
+from mbsim.core.arrays import F1
+from mbsim.core.jitable import jitable
+from mbsim.dynamics.bodies.scales import fill_squares
+from mbsim.dynamics.pipeline.audit import note
+from mbsim.stepping.arrays import (
+    LEFT,
+    POINTS,
+    RESIDUAL,
+    STEP_LENGTH,
+    Stepping,
+)
+
+#: Rounding of friction on its cone.
+CONE_ROUNDING = 1e-12
+#: Depth that steps explain, over the scene's length times tol.
+EXPLAINED = 10.0
+
+
+@jitable
+def examine_points(scene: Scene, S: Stepping, t: float) -> None:
+    """Note the largest depth, and the most that friction is beyond its cone."""
+    P, tol = S.points, scene.audit.plan[AUDIT_TOL]
+    for k in range(S.tally.count[POINTS]):
+        c = P.contact[k]
+        length = scene.scales.length[scene.scales.of_contact[c]]
+        if P.gap[k] < 0.0:
+            note(scene, PENETRATION, -P.gap[k], EXPLAINED * tol * length, t, c)
+        if P.r[k, 0] == 0.0 or P.mu[k] == 0.0:
+            continue
+        most = P.mu[k] * P.r[k, 0]
+        row = scene.audit.contact[c]
+        row[LARGEST_FRICTION] = max(row[LARGEST_FRICTION], most / S.tally.number[STEP_LENGTH])
+        across = math.hypot(P.r[k, 1], P.r[k, 2])
+        beyond = max(0.0, across / most - 1.0 - CONE_ROUNDING)
+        note(scene, CONE, beyond, tol, t, c)
+
+
+@jitable
+def examine_step(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> None:
+    """Note what the step that ends at t leaves open."""
+    tally, number = scene.audit.tally, S.tally.number
+    if h == 0.0:
+        return
+    tally[STEPS_ALL] += 1.0
+    if S.tally.count[POINTS] > 0:
+        allowed = S.plan.number[LEFT] / number[STEP_LENGTH]
+        note(scene, UNSOLVED_IMPULSES, number[RESIDUAL], allowed, t, -1)
+        examine_points(scene, S, t)
+    tally[STEPS_SINCE] += 1.0
+    if tally[STEPS_SINCE] < scene.audit.plan[AUDIT_EVERY]:
+        return
+    tally[STEPS_SINCE] = 0.0
+    fill_squares(scene, y)
+    for g in range(len(scene.work.squares)):
+        energy = scene.scales.mass[g] * scene.work.squares[g]
+        tally[USUAL_ENERGY] = max(tally[USUAL_ENERGY], energy)
+    if scene.world.hooks[Hook.JOINTS] != 0:
+        joints = scene.world.hooks[Hook.JOINTS]
+        note_failure(scene, call_int(joints, (scene, Joints.AUDIT, t, y, y)))

@@ -1,0 +1,234 @@
+"""What a Force_Contact says of rigid contact: friction by slip speed, and restitution.
+
+A friction law is asked for its force at many slip speeds, of a built-in law as of a user's
+function. Where it first reaches its largest value contact sticks up to that: regularised laws rise
+there, from 0, only because they cannot hold. Above that speed the coefficient is the law's own.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbsim.errors import ModelError
+from mbsim.laws.abi import FRICTION_INPUTS, LOCI_IN, NFORCE_IN, TIME_IN, X_IN, XDOT_IN
+from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
+from mbsim.model.names import element_name
+from mbsim.stepping.arrays import (
+    FIRST_SPEED,
+    RESTITUTION,
+    RULE_NUMBERS,
+    SLOWEST,
+    SPEEDS,
+    STICKING,
+    Rules,
+)
+
+if TYPE_CHECKING:
+    from mbsim.compile_model.build import System
+    from mbsim.model.elements import Contact
+
+_LAW = ctypes.CFUNCTYPE(
+    ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p
+)
+#: Slip speeds at which a law is asked, over the model's own speed: from, to, and how many.
+SLOWEST_ASKED, FASTEST_ASKED, ASKED = 1e-7, 1e2, 721
+#: What friction may change by where a law looks at what rigid contact does not know.
+SAME = 1e-6
+#: Part of the largest coefficient from which on contact slips.
+NEARLY = 1.0 - 1e-3
+#: Steps of the impact from which a damper's restitution is found, over its duration.
+STEPS = 2000
+
+
+class Coefficients:
+    """The rigid contacts of a system, with what the log is to say of them."""
+
+    def __init__(self, system: System) -> None:
+        self.system = system
+        self.said: list[str] = []
+        contacts = [system.model.contacts[id] for id in system.contact_ids]
+        self.rules = Rules(
+            np.zeros((len(contacts), RULE_NUMBERS)), np.zeros((len(contacts), SPEEDS))
+        )
+        for c, contact in enumerate(contacts):
+            number = self.rules.number[c]
+            self._friction(c, contact)
+            number[RESTITUTION] = self._restitution(contact)
+            if contact.cnf_type == "POISSON":
+                number[SLOWEST] = contact.normal_trans_vel
+
+    def _name(self, contact: Contact) -> str:
+        return element_name(self.system.model.file, "Force_Contact", contact.id)
+
+    def _refuse(self, contact: Contact, why: str) -> ModelError:
+        """Return what says that a contact cannot be rigid."""
+        where = f"{self.system.model.file}:{contact.source.line}: {self._name(contact)}"
+        return ModelError(f"{where}: integrator MOREAU {why}")
+
+    def _friction(self, c: int, contact: Contact) -> None:
+        """Fill the coefficients of friction of a contact."""
+        number, curve = self.rules.number[c], self.rules.curve[c]
+        if contact.cff_type == "COULOMB_OFF":
+            number[FIRST_SPEED] = math.inf
+            return
+        if contact.cff_type in FRICTION_LAWS and not contact.asks_user:
+            law = FRICTION_LAWS[contact.cff_type]
+            if law.of_area:
+                raise self._refuse(
+                    contact, f"has no friction against spin, which cff_type={law.name} is"
+                )
+            if dict(contact.friction).get("rolling_arm", 0.0) > 0.0:
+                raise self._refuse(
+                    contact, f"has no friction against rolling, which cff_type={law.name} is"
+                )
+            if law.memory:
+                # what such a law keeps is the give that rigid contact has not
+                number[FIRST_SPEED] = contact.stiction_trans_vel
+                number[STICKING] = max(contact.mu_static, contact.mu_dynamic)
+                curve[:] = contact.mu_dynamic
+                self.said.append(
+                    f"{self._name(contact)}: {law.name} as Coulomb's law: it sticks up to "
+                    f"{number[STICKING]:g} and slides with {contact.mu_dynamic:g}"
+                )
+                return
+        elif contact.asks_user and self.system.user_friction[contact.id].states > 0:
+            raise self._refuse(contact, "takes no friction with states")
+        self._table(c, contact)
+
+    def _table(self, c: int, contact: Contact) -> None:
+        """Fill the coefficients by asking the contact's function."""
+        number, curve = self.rules.number[c], self.rules.curve[c]
+        usual = float(self.system.scene.world.scale[1])
+        speeds = usual * np.geomspace(SLOWEST_ASKED, FASTEST_ASKED, ASKED)
+        mu = np.array([self._asked(c, contact, v) for v in speeds])
+        top = float(mu.max())
+        first = int(np.argmax(mu >= NEARLY * top)) if top > 0.0 else 0
+        if top > 0.0 and speeds[first] > usual:
+            raise self._refuse(
+                contact,
+                f"cannot read a coefficient of friction: it still grows at a slip of {usual:.3g}",
+            )
+        number[FIRST_SPEED], number[STICKING] = speeds[first], top
+        at = speeds[first] * 2.0 ** np.arange(SPEEDS)
+        curve[:] = np.interp(at, speeds, mu)
+        if contact.asks_user:
+            self.said.append(
+                f"{self._name(contact)}: {contact.cff.fnc_name} gives a coefficient of friction "
+                f"of {top:.4g} up to a slip of {speeds[first]:.3g}, {mu[-1]:.4g} where that is fast"
+            )
+
+    def _call(self, c: int, contact: Contact, **changes: Any) -> np.ndarray[Any, Any]:
+        """Return Fx, Fy, ... of the contact's law with these inputs changed."""
+        table = self.system.scene.contacts
+        given, out = np.zeros(FRICTION_INPUTS), np.zeros(16)
+        given[NFORCE_IN] = changes.get("normal", self.system.load or 1.0)
+        given[XDOT_IN : XDOT_IN + 2] = changes["slip"]
+        given[TIME_IN], given[X_IN] = changes.get("time", 0.0), changes.get("x", 0.0)
+        given[LOCI_IN : LOCI_IN + 3] = changes.get("place", 0.0)
+        par = np.ascontiguousarray(table.friction_par[c])
+        law = _LAW(int(table.friction_law[c]))
+        if law(contact.id, given.ctypes.data, par.ctypes.data, out.ctypes.data) != 0:
+            raise self._refuse(contact, "cannot ask its friction function, which failed")
+        return out / given[NFORCE_IN]
+
+    def _asked(self, c: int, contact: Contact, v: float) -> float:
+        """Return the coefficient of friction at a slip speed; raise where there is none."""
+        usual = self._call(c, contact, slip=(v, 0.0))
+        mu = -float(usual[0])
+        if contact.asks_user:
+            others = {
+                "X": self._call(c, contact, slip=(v, 0.0), x=1e-3)[0],
+                "the time": self._call(c, contact, slip=(v, 0.0), time=1.0)[0],
+                "LOCI": self._call(c, contact, slip=(v, 0.0), place=1.0)[0],
+                "more than the size of the normal force": self._call(
+                    c, contact, slip=(v, 0.0), normal=3.0 * (self.system.load or 1.0)
+                )[0],
+                "the direction of slip": self._call(c, contact, slip=(0.0, v))[1],
+            }
+            for what, other in others.items():
+                if not abs(other - usual[0]) <= SAME * max(abs(mu), 1e-3):
+                    raise self._refuse(
+                        contact,
+                        f"cannot read a coefficient of friction: {contact.cff.fnc_name} looks at "
+                        f"{what} (asked at a slip of {v:.3g})",
+                    )
+        if not mu >= 0.0:
+            raise self._refuse(
+                contact,
+                f"cannot read a coefficient of friction: at a slip of {v:.3g} it is {mu:.3g}",
+            )
+        return mu
+
+    def _restitution(self, contact: Contact) -> float:
+        """Return the coefficient of restitution of a contact."""
+        if contact.cnf_type == "POISSON":
+            return float(contact.restitution_coef or 0.0)
+        if contact.cnf_type not in NORMAL_LAWS or contact.cnf_type == "VOLUME":
+            raise self._refuse(
+                contact, f"cannot read a restitution from cnf_type={contact.cnf_type}"
+            )
+        if contact.restitution_coef is not None and contact.cnf_type in ("HERTZ", "HUNT_CROSSLEY"):
+            return float(contact.restitution_coef)
+        speed, mass = self._impact(contact)
+        e = rebound(self.system, contact, speed, mass)
+        self.said.append(
+            f"{self._name(contact)}: restitution {e:.3g}, which its {contact.cnf_type} has at a "
+            f"closing speed of {speed:.3g} and a mass of {mass:.3g}"
+        )
+        return e
+
+    def _impact(self, contact: Contact) -> tuple[float, float]:
+        """Return the closing speed and the mass (F = m a) at which a contact is looked at."""
+        scene, system = self.system.scene, self.system
+        body = dict(zip(system.graphic_ids, scene.graphics.body.tolist(), strict=True))
+        moving = len(scene.bodies.mass)
+
+        def inverse(ids: tuple[int, ...]) -> float:
+            rows = [body[id] for id in ids if body[id] < moving]
+            found = [1.0 / float(scene.bodies.mass[b]) for b in rows]
+            return float(np.median(found)) if found else 0.0
+
+        mass = 1.0 / (inverse(contact.i_graphics_id) + inverse(contact.j_graphics_id))
+        if contact.ref_velocity is not None:
+            return float(contact.ref_velocity), mass
+        return float(scene.world.scale[1]), mass
+
+
+def rebound(system: System, contact: Contact, speed: float, mass: float) -> float:
+    """Return the rebound of a mass that meets a contact's normal law at a speed, over that.
+
+    The law alone acts: m d'' = -F(d, d') from d = 0, d' = speed, by Runge and Kutta's method.
+    """
+    from mbsim.laws.abi import normal_constants
+
+    law = NORMAL_LAWS[contact.cnf_type]
+    if law.of_shapes:
+        raise ModelError(
+            f"{system.model.file}:{contact.source.line}: Force_Contact[{contact.id}]: give "
+            "restitution_coef and ref_velocity for integrator MOREAU"
+        )
+    constants = tuple(normal_constants(law, contact).tolist())
+
+    def slope(d: float, v: float) -> tuple[float, float]:
+        return v, -law.law(d, v, *constants)[0] / mass
+
+    # the time in which an elastic force would stop it
+    depth = speed * 1e-6
+    while law.law(depth, 0.0, *constants)[2] < 0.5 * mass * speed * speed and depth < 1e9 * speed:
+        depth *= 1.5
+    h = 2.0 * depth / speed / STEPS
+    d, v = 0.0, speed
+    for _ in range(100 * STEPS):
+        a1, b1 = slope(d, v)
+        a2, b2 = slope(d + 0.5 * h * a1, v + 0.5 * h * b1)
+        a3, b3 = slope(d + 0.5 * h * a2, v + 0.5 * h * b2)
+        a4, b4 = slope(d + h * a3, v + h * b3)
+        d += h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+        v += h / 6.0 * (b1 + 2.0 * b2 + 2.0 * b3 + b4)
+        if d <= 0.0:
+            return max(0.0, min(1.0, -v / speed))
+    return 0.0

@@ -1,0 +1,115 @@
+"""The hooks of a mechanism that steps with contacts of its own, given one packed `Scene`."""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.codes import LISTINGS
+from mbsim.arrays.hooks import Contacts, Hook, Joints, failure_or
+from mbsim.arrays.scene import Scene
+from mbsim.core.address import call_int, vector_at, view
+from mbsim.core.arrays import F1, Pointer
+from mbsim.core.jitable import jitable
+from mbsim.core.problem import Taken
+from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics
+from mbsim.dynamics.bodies.scales import take_speeds
+from mbsim.dynamics.contact.detection import find_contacts
+from mbsim.dynamics.pipeline.hooks import accept
+from mbsim.dynamics.pipeline.output import no_room, scaled_error
+from mbsim.stepping.arrays import FIXED, Stepping
+from mbsim.stepping.audit import examine_step
+from mbsim.stepping.points import commit_distances
+from mbsim.stepping.rows import (
+    add_lost,
+    fill_contacts,
+    fill_incidents,
+    hardest,
+    keep_step,
+    push_as_kept,
+    watch_peaks,
+)
+from mbsim.stepping.step import take_step
+
+
+@jitable
+def push(scene: Scene, S: Stepping, h: float, y: F1) -> int:
+    """Add what contacts did in the last step; at its end find what overlaps. Return 0 or a code."""
+    push_as_kept(scene, S, y)
+    if h > 0.0 or S.kept.count[0] > 0:
+        return 0
+    code = find_contacts(scene, y)
+    hit = scene.work.hit
+    hit[len(hit) - 1] = 0
+    return code
+
+
+def serve_contacts(context: int, what: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
+    """What contacts are asked for; `a` is y, `b` is y' of PUSH, a row of energies of ENERGY."""
+    scene = view(context, Scene)
+    S = view(scene.world.hooks[Hook.STEPPING], Stepping)
+    y = vector_at(a, scene.rows.y.shape[1])
+    if what == Contacts.PUSH:
+        return -push(scene, S, h, y)
+    if what == Contacts.KEEP:
+        keep_step(scene, S, t, h)
+        place_bodies(scene, y)
+        place_graphics(scene, y)
+    elif what == Contacts.INCIDENTS:
+        return fill_incidents(scene, S)
+    elif what == Contacts.HARDEST:
+        return hardest(scene, S)
+    elif what == Contacts.WATCH:
+        watch_peaks(scene, S, t)
+    elif what == Contacts.GAPS:
+        commit_distances(scene)
+    elif what == Contacts.ENERGY:
+        add_lost(scene, y, vector_at(b, scene.rows.energy.shape[1]))
+    elif what == Contacts.ROW:
+        fill_contacts(scene, S, y, scene.rows.contact[scene.rows.used[0]])
+    return 0
+
+
+def step(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
+    """The state a step later; t is the step's begin, less 0 h where it is not the committed one."""
+    scene = view(context, Scene)
+    S = view(scene.world.hooks[Hook.STEPPING], Stepping)
+    n = scene.rows.y.shape[1]
+    length, committed = abs(h), h > 0.0
+    code = take_step(scene, S, t, length, vector_at(a, n), vector_at(b, n), committed)
+    return failure_or(scene, code)
+
+
+def norm(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
+    """The scaled error of positions; none where steps are as long as the deck says."""
+    scene = view(context, Scene)
+    S = view(scene.world.hooks[Hook.STEPPING], Stepping)
+    if S.plan.number[FIXED] == 1.0:
+        return 0.0
+    n = scene.rows.y.shape[1]
+    return scaled_error(scene, math.inf if h > 0.0 else h, vector_at(a, n), vector_at(b, n))
+
+
+def commit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
+    """What a step that is taken leaves: contact points, events, peaks, what it is judged by."""
+    scene = view(context, Scene)
+    S = view(scene.world.hooks[Hook.STEPPING], Stepping)
+    listings = scene.log.counters[LISTINGS]
+    if scene.world.hooks[Hook.JOINTS] != 0:
+        code = call_int(scene.world.hooks[Hook.JOINTS], (scene, Joints.KEEP, t, a, a))
+        if code != 0:
+            return -failure_or(scene, code)
+    y = vector_at(a, scene.rows.y.shape[1])
+    take_speeds(scene, y, scene.state.fastest)
+    accept(scene, t, h, y)
+    examine_step(scene, S, t, h, y)
+    word = 0
+    if no_room(scene):
+        word += Taken.ROWS_FULL
+    if scene.log.counters[LISTINGS] > listings:
+        word += Taken.STABLE_IS_STALE
+    code = failure_or(scene, 0)
+    return word if code == 0 else -code
+
+
+#: By their names in `Problem`, in place of those of compliant contact.
+HOOKS = {"step": step, "norm": norm, "commit": commit}

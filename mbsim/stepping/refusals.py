@@ -1,0 +1,67 @@
+"""What nonsmooth time stepping cannot run, said by element and line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from mbsim.errors import ModelError
+from mbsim.forces.catalog import FORCES, OfResidual, Switched
+from mbsim.model.names import element_name
+
+if TYPE_CHECKING:
+    from mbsim.model.elements import Model
+
+
+def _refused(model: Model) -> Iterator[tuple[str, Mapping[int, Any], str]]:
+    """Yield statement, elements and why they are not run."""
+    held = "it has no constraints beside contacts yet"
+    yield "Constraint_Joint", model.joints, held
+    yield "Constraint_Jprim", model.primitives, held
+    yield "Constraint_Coupler", model.couplers, held
+    yield "Motion_Joint", model.motions, held
+    yield "Constraint_General", model.general_constraints, held
+    for name in FORCES:
+        kind = FORCES[name]
+        if isinstance(kind.form, OfResidual):
+            why = "a residual is solved by methods that estimate their error"
+            yield kind.statement, model.table(kind.name), why
+        elif isinstance(kind.form, Switched):
+            why = "what switches within a step is located by methods that estimate their error"
+            yield kind.statement, model.table(kind.name), why
+    yield "Force_JointFriction", model.joint_frictions, held
+    patches = {i: c for i, c in model.contacts.items() if c.contact_depth == "FIELD"}
+    yield "Force_Contact", patches, "a field of depth has no contact points"
+    posts = {i: c for i, c in model.contacts.items() if c.cpost is not None}
+    yield "Force_Contact", posts, "a CONTACTPOST is asked of compliant contacts"
+
+
+#: Moving bodies in contact from which on a pile is what a model is.
+MANY = 20
+
+
+def serves_better(model: Model) -> str:
+    """Return what is to be said where MOREAU would serve a model better than AUTO, else nothing.
+
+    That is a pile: many free bodies that contacts alone hold. Its compliant contacts need steps as
+    short as they are stiff.
+    """
+    moving = sum(not body.is_ground for body in model.bodies.values())
+    if not model.contacts or moving < MANY or any(table for _, table, _ in _refused(model)):
+        return ""
+    return (
+        f"{moving} free bodies in contact: integrator MOREAU takes them as rigid, by steps that "
+        "no stiffness bounds (manual: computation/rigid-contact)"
+    )
+
+
+def refuse(model: Model) -> None:
+    """Raise what a model has that MOREAU cannot run."""
+    for statement, elements, why in _refused(model):
+        for element in elements.values():
+            xml = getattr(element, "statement", statement)
+            name = element_name(model.file, xml, element.id)
+            raise ModelError(
+                f"{model.file}:{element.source.line}: {name}: integrator MOREAU cannot run this: "
+                f"{why}; take AUTO"
+            )

@@ -1,0 +1,152 @@
+"""A mechanism as the problem of a method whose contacts are rigid."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numba import types
+
+from mbsim.arrays.codes import SCALE_LENGTH
+from mbsim.arrays.hooks import Hook
+from mbsim.core import jit
+from mbsim.core.address import pack
+from mbsim.core.problem import Problem, addresses
+from mbsim.errors import ModelError
+from mbsim.geometry.catalog import NEARS, PAIRS, REGION_ROWS
+from mbsim.stepping.arrays import (
+    ALL_POINTS,
+    ALL_STEPS,
+    ALL_SWEEPS,
+    FIXED,
+    LEFT,
+    NEWTONS,
+    PLAN_NUMBERS,
+    PROJECTED,
+    SLOP,
+    UNSOLVED,
+    Plan,
+    Stepping,
+    make,
+)
+from mbsim.stepping.coefficients import Coefficients
+
+if TYPE_CHECKING:
+    from mbsim.compile_model.build import System
+    from mbsim.compile_model.pairing import Kind
+
+_INT, _T, _PTR = types.int64, types.float64, types.CPointer(types.float64)
+_CONTACTS = _INT(_INT, _INT, _T, _T, _PTR, _PTR)
+#: Hooks of compliant contact, which rigid contact has no use for.
+COMPLIANT = frozenset(
+    {
+        Hook.TILTING,
+        Hook.RECALL,
+        Hook.SPREAD,
+        Hook.HOLD_BACK,
+        Hook.STICKING,
+        Hook.CONTACT_SLOPES,
+        Hook.FACE_SLOPES,
+        Hook.MEMORY,
+        Hook.MEMORY_PAIR,
+        Hook.GAUGES,
+        Hook.EFFECTS,
+        Hook.STABILITY,
+        Hook.FCL_POINTS,
+    }
+)
+#: Pairs whose rows are features that may meet where the shapes are apart too.
+APART = frozenset({"SPHERE-PLANE", "SPHERE-SPHERE", "SPHERE-BOX", "BOX-PLANE", "ELLIPSOID-PLANE"})
+#: Contact points of a body at most, in the mean.
+POINTS_EACH = 64
+#: A gap, or what a position changes by, counts from this part of tol L on; what the solver may
+#: leave of a velocity is that part of tol L / h.
+COUNTS, LEAVES = 0.1, 3e-3
+
+
+class Made(NamedTuple):
+    """A problem, its arrays, and the tables that must live as long as it is used."""
+
+    problem: Problem
+    stepping: Stepping
+    tables: tuple[Any, ...]
+    said: tuple[str, ...]
+
+    def counters(self) -> dict[str, float]:
+        """Return what was counted, under the names that results give it."""
+        count = self.stepping.tally.count
+        return {
+            "contact_solves": int(count[ALL_STEPS]),
+            "contact_sweeps": int(count[ALL_SWEEPS]),
+            "contact_newtons": int(count[NEWTONS]),
+            "contact_unsolved": int(count[UNSOLVED]),
+            "contact_projections": int(count[PROJECTED]),
+            "contact_points": int(count[ALL_POINTS]),
+        }
+
+
+def _plan(system: System, fixed: bool, tol: float) -> Plan:
+    """Return what holds for the run, and let pairs be measured where they are apart too."""
+    from mbsim.compile_model.contacts import pair_address
+    from mbsim.compile_model.pair_adapter import SIGNATURE, adapt_pair
+
+    kinds, scene = system.plans.kinds, system.scene
+    near, rows = (np.zeros(len(kinds), dtype=np.int64) for _ in range(2))
+    for k, kind in enumerate(kinds):
+        rows[k] = kind.slots - (REGION_ROWS if kind.region else 0)
+        near[k] = kind.closed_form in APART or kind.closed_form in NEARS
+        if kind.closed_form in NEARS:
+            adapted = adapt_pair(NEARS[kind.closed_form], int(rows[k]))
+            scene.kinds.kernel[k] = jit.address(adapted, SIGNATURE)
+        elif kind.region:
+            scene.kinds.kernel[k] = pair_address(PAIRS[kind.closed_form])
+    number = np.zeros(PLAN_NUMBERS)
+    length = float(scene.world.scale[SCALE_LENGTH])
+    number[FIXED] = float(fixed)
+    number[SLOP], number[LEFT] = COUNTS * tol * length, LEAVES * tol * length
+    return Plan(number, near, rows)
+
+
+def _is_patch(kind: Kind) -> bool:
+    """Return whether a pair's incidents are areas that have no points."""
+    return kind.has_area and not kind.region
+
+
+def rigid_mechanism(system: System, fixed: bool, tol: float) -> Made:
+    """Return a system as a problem that steps with rigid contacts of its own."""
+    from mbsim.dynamics.pipeline import hooks as shared
+    from mbsim.dynamics.pipeline.hook_table import fill
+
+    scene = system.scene
+    for kind in system.plans.kinds:
+        if _is_patch(kind):
+            contact = system.model.contacts[kind.contact]
+            raise ModelError(
+                f"{system.model.file}:{contact.source.line}: Force_Contact[{contact.id}]: "
+                f"integrator MOREAU cannot run this: {kind.shape_i} on {kind.shape_j} touch in "
+                "patches of triangles, which are no contact points; take AUTO"
+            )
+    found = Coefficients(system)
+    plan = _plan(system, fixed, tol)
+    nb = len(scene.bodies.mass)
+    capacity = min(len(scene.slots.pair), POINTS_EACH * (nb + 4))
+    sizes = nb, len(scene.graphics.body), scene.rows.y.shape[1], capacity
+    stepping = make(found.rules, plan, sizes)
+    inner, outer = pack(stepping), pack(scene)
+    scene.world.hooks[Hook.STEPPING] = int(inner.ctypes.data)
+
+    from mbsim.stepping import hooks as own
+
+    if len(scene.contacts.id) > 0:
+        scene.world.hooks[Hook.CONTACTS] = jit.address(own.serve_contacts, _CONTACTS)
+    fill(scene, only=set(Hook) - COMPLIANT - {Hook.CONTACTS})
+    hooks = {**shared.HOOKS, **own.HOOKS}
+    if len(scene.sensors.id) > 0:
+        from mbsim.dynamics.events.sensors import arrive_hook, happens_hook
+
+        hooks["arrive"] = arrive_hook
+        if scene.sensors.located.any():
+            hooks["happens"] = happens_hook
+    absent = {"check": 0, "inner": 0, "look": 0}
+    problem = Problem(int(outer.ctypes.data), **(absent | addresses(hooks)))
+    return Made(problem, stepping, (inner, outer), tuple(found.said))

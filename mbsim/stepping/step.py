@@ -1,0 +1,382 @@
+"""One step of nonsmooth time stepping: the file to read first.
+
+    v_free = v + h M^-1 f(t, q, v)          forces as they are at the step's begin
+    v' = v_free + sum of M^-1 H' r          contacts by impulses r (`solver`)
+    q' = q moved on for h by (1 - c) v' + c v
+
+c is 1/2 for bodies on which no contact closes in the step, so that flight and what slides or rests
+are of order 2; 0 for those that a contact stops, which then end where gap + h u_n' >= 0 says:
+at the surface; with restitution the part of the step before the impact.
+Source: J. J. Moreau (1988); M. Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235; gaps in the
+complementarity: M. Anitescu, F. A. Potra, Nonlinear Dynamics 14 (1997) 231; projection of
+positions: V. Acary, Comput. Methods Appl. Mech. Eng. 256 (2013) 224.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.hooks import Hook, Joints
+from mbsim.arrays.scene import Scene
+from mbsim.core.address import call_int
+from mbsim.core.arrays import F1, V3
+from mbsim.core.codes import Code
+from mbsim.core.jitable import jitable
+from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
+from mbsim.core.rotation import (
+    add,
+    cross,
+    dot,
+    matrix_from_quaternion,
+    norm,
+    rotate,
+    scale,
+    unrotate,
+    vector,
+)
+from mbsim.dynamics.bodies.acceleration import accelerate
+from mbsim.dynamics.bodies.configuration import turn
+from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics
+from mbsim.dynamics.contact.broadphase import list_pairs
+from mbsim.dynamics.pipeline.evaluate import add_gravity
+from mbsim.stepping.arrays import (
+    ALL_POINTS,
+    ALL_STEPS,
+    ALL_SWEEPS,
+    FIRST_SPEED,
+    LEFT,
+    NEWTONS,
+    POINTS,
+    PRESSING,
+    PROJECTED,
+    RESIDUAL,
+    RESTITUTION,
+    SLOP,
+    SLOWEST,
+    SPEEDS,
+    STEP_LENGTH,
+    STICKING,
+    UNSOLVED,
+    Stepping,
+)
+from mbsim.stepping.kept import index_kept, recall
+from mbsim.stepping.points import fill_point, fill_reach, find_points
+from mbsim.stepping.solver import (
+    apply,
+    project_positions,
+    solve_points,
+    velocity_of,
+)
+
+#: Closing speeds have no restitution up to so many times what the solver may leave of one.
+NOISE = 30.0
+#: Newton iterations for the spin of a body at most.
+MOST_SPINS = 12
+#: How much farther than a step can come near pairs are looked for.
+ROOM = 4.0
+#: Of `Motion.part`: no impact with restitution.
+NO_IMPACT = 2.0
+
+
+@jitable
+def find_forces(scene: Scene, t: float, y: F1, dy: F1) -> int:
+    """Fill y' = f(t, y) without contacts; return 0 or why it cannot be."""
+    place_bodies(scene, y)
+    add_gravity(scene)
+    for k in range(BODY_SIZE * len(scene.bodies.mass), len(dy)):
+        dy[k] = 0.0
+    if scene.world.hooks[Hook.APPLIED] != 0:
+        code = call_int(scene.world.hooks[Hook.APPLIED], (scene, t, y, dy))
+        if code != 0:
+            return code
+    if not math.isfinite(accelerate(scene, y, dy)):
+        return Code.NOT_FINITE
+    if scene.world.hooks[Hook.JOINTS] != 0:
+        return call_int(scene.world.hooks[Hook.JOINTS], (scene, Joints.ACCELERATE, t, y, dy))
+    return 0
+
+
+@jitable
+def make_room(scene: Scene, S: Stepping, y: F1, h: float) -> None:
+    """List near pairs farther than a step can come, where shapes got fast."""
+    broadphase = scene.broadphase
+    if len(broadphase.contact) == 0:
+        return
+    fill_reach(scene, S, h)
+    wanted, short = 0.0, False
+    for g in range(len(scene.graphics.body)):
+        if not math.isinf(broadphase.room[g]):
+            wanted = max(wanted, S.motion.reach[g])
+            short = short or S.motion.reach[g] > broadphase.room[g]
+    if short:
+        broadphase.size[0] = max(broadphase.size[0], ROOM * wanted)
+        place_graphics(scene, y)
+        list_pairs(scene, y)
+
+
+@jitable
+def spin_freely(scene: Scene, y: F1, b: int, h: float) -> V3:
+    """Return the angular velocity after h, global axes, that torques and the spin itself change.
+
+    The midpoint rule in body axes, I (w' - w) = h (T - m x I m), m = (w + w')/2: it keeps energy
+    and the size of the angular momentum of what spins freely, however long the step. The attitude
+    is then turned by m.
+    """
+    R, J = scene.work.R[b], scene.bodies.inertia[b]
+    at = BODY_SIZE * b
+    before = (y[at + AT_W], y[at + AT_W + 1], y[at + AT_W + 2])
+    T = unrotate(R, vector(scene.work.torque[b]))
+    w = before
+    for _ in range(MOST_SPINS):
+        m = scale(0.5, add(before, w))
+        L = rotate(J, m)
+        turns = cross(m, L)
+        change = rotate(J, (w[0] - before[0], w[1] - before[1], w[2] - before[2]))
+        off = add(change, scale(h, (turns[0] - T[0], turns[1] - T[1], turns[2] - T[2])))
+        k = 0.5 * h
+        # I + h/2 ([m] I - [I m]) by rows, [a] b = a x b
+        x = (
+            J[0, 0] + k * (m[1] * J[2, 0] - m[2] * J[1, 0]),
+            J[0, 1] + k * (m[1] * J[2, 1] - m[2] * J[1, 1] + L[2]),
+            J[0, 2] + k * (m[1] * J[2, 2] - m[2] * J[1, 2] - L[1]),
+        )
+        z = (
+            J[1, 0] + k * (m[2] * J[0, 0] - m[0] * J[2, 0] - L[2]),
+            J[1, 1] + k * (m[2] * J[0, 1] - m[0] * J[2, 1]),
+            J[1, 2] + k * (m[2] * J[0, 2] - m[0] * J[2, 2] + L[0]),
+        )
+        u = (
+            J[2, 0] + k * (m[0] * J[1, 0] - m[1] * J[0, 0] + L[1]),
+            J[2, 1] + k * (m[0] * J[1, 1] - m[1] * J[0, 1] - L[0]),
+            J[2, 2] + k * (m[0] * J[1, 2] - m[1] * J[0, 2]),
+        )
+        p, g, r = cross(z, u), cross(u, x), cross(x, z)
+        d = dot(x, p)
+        if d == 0.0:
+            break
+        step = scale(-1.0 / d, add(scale(off[0], p), add(scale(off[1], g), scale(off[2], r))))
+        w = add(w, step)
+        if norm(step) <= 1e-14 * norm(w):
+            break
+    m = scale(0.5, add(before, w))
+    q = y[at : at + BODY_SIZE].copy()
+    S = R.copy()
+    turn(y[at : at + BODY_SIZE], 0, h, m[0], m[1], m[2], q)
+    matrix_from_quaternion(q[AT_Q:], S)
+    return rotate(S, w)
+
+
+@jitable
+def fill_motion(scene: Scene, S: Stepping, y: F1, h: float) -> None:
+    """Fill velocities before the step and without contacts, and inverse masses."""
+    M, bodies, dy = S.motion, scene.bodies, S.motion.slope
+    for b in range(len(bodies.mass)):
+        at, R = BODY_SIZE * b, scene.work.R[b]
+        before, free, inverse = M.before[b], M.free[b], M.inverse[b]
+        w = vector(scene.work.w[b])
+        for c in range(3):
+            before[c], before[3 + c] = y[at + AT_V + c], w[c]
+            free[c] = y[at + AT_V + c] + h * dy[at + AT_V + c]
+        w = spin_freely(scene, y, b, h)
+        for c in range(3):
+            free[3 + c] = w[c]
+        for r in range(3):
+            # row r of R I^-1
+            x = unrotate(bodies.inverse[b], vector(R[r]))
+            for c in range(3):
+                inverse[r, c] = inverse[r, 3 + c] = inverse[3 + r, c] = 0.0
+                inverse[3 + r, 3 + c] = dot(x, vector(R[c]))
+            inverse[r, r] = 1.0 / bodies.mass[b]
+
+
+@jitable
+def coefficient(S: Stepping, c: int, slip: float) -> float:
+    """Return the coefficient of friction of contact c at a slip speed."""
+    numbers, curve = S.rules.number[c], S.rules.curve[c]
+    if slip <= numbers[FIRST_SPEED]:
+        return numbers[STICKING]
+    at = math.log2(slip / numbers[FIRST_SPEED])
+    k = int(at)
+    if k >= SPEEDS - 1:
+        return curve[SPEEDS - 1]
+    return curve[k] + (at - k) * (curve[k + 1] - curve[k])
+
+
+@jitable
+def look_ahead(S: Stepping, k: int, h: float) -> float:
+    """Fill what the normal velocity of point k is held above; return the part before an impact.
+
+    That is 0 where there is no restitution: then the gap is all that may close. Else the point
+    comes in at u, and leaves at e u; what accelerates it goes on behind the impact.
+    """
+    P, M, rule = S.points, S.motion, S.rules.number[S.points.contact[k]]
+    gap, before = P.gap[k], P.closing[k]
+    free = velocity_of(P.H, k, 0, M.free, P.body[k, 0], P.body[k, 1])
+    mean = 0.5 * (before + free)
+    P.ahead[k] = max(gap, 0.0) / h
+    if gap + h * mean >= 0.0:
+        # it does not close by itself
+        P.ahead[k] = max(P.ahead[k], -free)
+        return 0.0
+    if rule[RESTITUTION] == 0.0 or before >= -max(rule[SLOWEST], NOISE * S.plan.number[LEFT] / h):
+        return 0.0
+    part = min(max(gap, 0.0) / (h * -mean), 1.0)
+    comes = before + part * (free - before)
+    leaves = -rule[RESTITUTION] * comes + (1.0 - part) * (free - before)
+    P.ahead[k] = -max(leaves, 0.0)
+    return part
+
+
+@jitable
+def prepare_points(scene: Scene, S: Stepping, y: F1, h: float) -> None:
+    """Fill all that the solver takes, impulses as the last step had them, and velocities so."""
+    P, M, nb = S.points, S.motion, len(scene.bodies.mass)
+    count = S.tally.count[POINTS]
+    for k in range(count):
+        fill_point(scene, S, y, k)
+        i, j = P.body[k, 0], P.body[k, 1]
+        x, z = velocity_of(P.H, k, 1, M.before, i, j), velocity_of(P.H, k, 2, M.before, i, j)
+        P.mu[k] = coefficient(S, P.contact[k], math.hypot(x, z))
+    for b in range(nb + 1):
+        M.part[b] = NO_IMPACT
+        for c in range(6):
+            M.v[b, c] = M.free[b, c]
+    recall(S, h)
+    for k in range(count):
+        part = look_ahead(S, k, h)
+        if part > 0.0:
+            for side in range(2):
+                b = P.body[k, side]
+                M.part[b] = min(M.part[b], part)
+        if P.r[k, 0] > 0.0:
+            r = (P.r[k, 0], P.r[k, 1], P.r[k, 2])
+            apply(P.answer, k, M.v, P.body[k, 0], P.body[k, 1], r)
+
+
+@jitable
+def spread_parts(S: Stepping, count: int, h: float, slop: float, ground: int) -> None:
+    """Find the bodies that a contact stops in the step, and all that press on them.
+
+    Between two bodies of different parts a contact that stays closed would open or go deeper.
+    """
+    P, M = S.points, S.motion
+    for b in range(ground + 1):
+        if M.part[b] == NO_IMPACT:
+            M.part[b] = 0.5
+    for k in range(count):
+        if P.r[k, 0] == 0.0:
+            continue
+        i, j = P.body[k, 0], P.body[k, 1]
+        after = velocity_of(P.H, k, 0, M.v, i, j)
+        if P.ahead[k] >= 0.0 and 0.5 * h * abs(after - P.closing[k]) > slop:
+            M.part[i] = M.part[j] = 0.0
+    changed = True
+    while changed:
+        changed = False
+        for k in range(count):
+            i, j = P.body[k, 0], P.body[k, 1]
+            if P.r[k, 0] == 0.0 or i == ground or j == ground:
+                continue
+            if M.part[i] != M.part[j]:
+                M.part[i] = M.part[j] = min(M.part[i], M.part[j])
+                changed = True
+
+
+@jitable
+def move_bodies(scene: Scene, S: Stepping, y: F1, h: float, new: F1) -> None:
+    """Write positions and velocities after the step."""
+    M = S.motion
+    for b in range(len(scene.bodies.mass)):
+        at, R = BODY_SIZE * b, scene.work.R[b]
+        for c in range(3):
+            new[at + c] = y[at + c] + h * M.shift[b, c]
+            new[at + AT_V + c] = M.v[b, c]
+        w = unrotate(R, (M.shift[b, 3], M.shift[b, 4], M.shift[b, 5]))
+        turn(y, at, h, w[0], w[1], w[2], new)
+        length = math.sqrt(
+            new[at + 3] ** 2 + new[at + 4] ** 2 + new[at + 5] ** 2 + new[at + 6] ** 2
+        )
+        for c in range(4):
+            new[at + AT_Q + c] /= length
+        matrix_from_quaternion(new[at + AT_Q : at + AT_V], R)
+        w = unrotate(R, (M.v[b, 3], M.v[b, 4], M.v[b, 5]))
+        for c in range(3):
+            new[at + AT_W + c] = w[c]
+
+
+@jitable
+def add_losses(scene: Scene, S: Stepping, new: F1) -> None:
+    """Add what contacts took: an impulse does its work at the mean of velocities."""
+    P, M = S.points, S.motion
+    first = len(new) - len(scene.contacts.id)
+    for k in range(S.tally.count[POINTS]):
+        if P.r[k, 0] == 0.0:
+            continue
+        i, j, c = P.body[k, 0], P.body[k, 1], P.contact[k]
+        across = 0.0
+        for a in range(3):
+            u = velocity_of(P.H, k, a, M.before, i, j) + velocity_of(P.H, k, a, M.v, i, j)
+            new[first + c] -= 0.5 * P.r[k, a] * u
+            across += 0.5 * P.r[k, a] * u if a > 0 else 0.0
+        if scene.audit.friction_at[c] >= 0:
+            new[scene.audit.friction_at[c]] += across
+
+
+@jitable
+def solve_step(scene: Scene, S: Stepping, h: float) -> int:
+    """Find impulses and displacements of the points at hand; return 0 or a code."""
+    P, M, tally = S.points, S.motion, S.tally
+    count, nb = tally.count[POINTS], len(scene.bodies.mass)
+    slop = S.plan.number[SLOP]
+    allowed = S.plan.number[LEFT] / h
+    left, sweeps = 0.0, 0
+    if count > 0:
+        left, sweeps, newtons = solve_points(P, M, nb, count, allowed)
+        tally.count[NEWTONS] += newtons
+        if not math.isfinite(left):
+            return Code.NOT_FINITE
+    spread_parts(S, count, h, slop, nb)
+    for b in range(nb):
+        for c in range(6):
+            M.shift[b, c] = M.part[b] * M.before[b, c] + (1.0 - M.part[b]) * M.v[b, c]
+    pushes = project_positions(P, M.shift, count, h, slop)
+    number = tally.number
+    number[RESIDUAL], number[STEP_LENGTH] = left, h
+    tally.count[ALL_SWEEPS] += sweeps
+    tally.count[ALL_STEPS] += 1
+    tally.count[ALL_POINTS] += count
+    tally.count[UNSOLVED] += 1 if left > allowed else 0
+    tally.count[PROJECTED] += 1 if pushes > 1 else 0
+    pressing = 0
+    for k in range(count):
+        pressing += 1 if P.r[k, 0] > 0.0 else 0
+    tally.count[PRESSING] = pressing
+    return 0
+
+
+@jitable
+def take_step(
+    scene: Scene, S: Stepping, t: float, h: float, y: F1, new: F1, committed: bool
+) -> int:
+    """Fill the state a step h after (t, y); return 0 or a code."""
+    dy = S.motion.slope
+    code = find_forces(scene, t, y, dy)
+    if code != 0:
+        return code
+    fill_motion(scene, S, y, h)
+    if committed:
+        index_kept(S)
+        make_room(scene, S, y, h)
+    code = find_points(scene, S, y, h, committed)
+    if code != 0:
+        return code
+    prepare_points(scene, S, y, h)
+    code = solve_step(scene, S, h)
+    if code != 0:
+        return code
+    for k in range(BODY_SIZE * len(scene.bodies.mass), len(y)):
+        new[k] = y[k] + h * dy[k]
+    move_bodies(scene, S, y, h, new)
+    if S.tally.count[PRESSING] > 0:
+        add_losses(scene, S, new)
+    return 0

@@ -1,0 +1,142 @@
+"""MOREAU against closed forms: impacts, friction that holds and slides, stacks, restarts."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mbsim
+from mbsim.bench import deck as text
+from mbsim.errors import Interrupted, ModelError
+from tests.helpers import rigid_decks as decks
+
+G = 9.81
+
+
+def bouncing(t: float, height: float, e: float) -> float:
+    """Return the height of a ball dropped at rest, whose rebound is e times as fast."""
+    speed, first = math.sqrt(2.0 * G * height), math.sqrt(2.0 * height / G)
+    if t < first:
+        return height - 0.5 * G * t * t
+    t -= first
+    while speed > 1e-12:
+        speed *= e
+        if t < 2.0 * speed / G:
+            return speed * t - 0.5 * G * t * t
+        t -= 2.0 * speed / G
+    return 0.0
+
+
+@pytest.mark.parametrize("h", [0.01, 0.002])
+def test_a_ball_bounces_through_its_accumulation_point(tmp_path: Path, h: float) -> None:
+    """It lies still from T0 (1 + e)/(1 - e) on, T0 the time of the fall, to the step's size."""
+    e, height = 0.5, 0.5
+    results = mbsim.simulate(decks.ball(tmp_path, height, e, 1.5, h), integrator="MOREAU")
+    t, z = results["time"], results["bodies/2/position"][:, 2] - 0.1
+    rest = math.sqrt(2.0 * height / G) * (1.0 + e) / (1.0 - e)
+    moving = t[np.abs(z) > 1e-9]
+    assert moving[-1] == pytest.approx(rest, abs=2.0 * h + 0.01)
+    exact = np.array([bouncing(x, height, e) for x in t])
+    assert np.abs(z - exact).max() < 30.0 * h * h
+    assert results["contacts/301/force"][-1, 2] == pytest.approx(G, rel=1e-9)
+    assert results.audit.warnings == ()
+
+
+@pytest.mark.parametrize("tol", [1e-4, 1e-6])
+def test_the_step_follows_the_tolerance(tmp_path: Path, tol: float) -> None:
+    """Impacts are met by shorter steps, as the error of positions asks for."""
+    model = decks.ball(tmp_path, 0.5, 0.5, 1.5)
+    results = mbsim.simulate(model, integrator="MOREAU", tol=tol)
+    z = results["bodies/2/position"][:, 2] - 0.1
+    exact = np.array([bouncing(x, 0.5, 0.5) for x in results["time"]])
+    assert np.abs(z - exact).max() < 30.0 * tol
+
+
+def test_what_sticks_does_not_creep(tmp_path: Path) -> None:
+    """A box on a slope below the angle of friction stays where it is."""
+    model = decks.slope(tmp_path, 0.5, 0.36, 10.0, 0.01)
+    results = mbsim.simulate(model, integrator="MOREAU", tol=1e-8)
+    x = results["bodies/2/position"]
+    assert np.abs(x[-1] - x[0]).max() < 1e-9
+    assert np.abs(results["bodies/2/velocity"][-1]).max() < 1e-12
+
+
+def test_what_slides_is_of_the_closed_form(tmp_path: Path) -> None:
+    """Behind the angle of friction it goes a t^2 / 2, a = g (sin - mu cos)."""
+    mu, tangent, end = 0.2, 0.36, 2.0
+    model = decks.slope(tmp_path, mu, tangent, end, 0.01)
+    results = mbsim.simulate(model, integrator="MOREAU", tol=1e-8)
+    a = G * (tangent - mu) / math.sqrt(1.0 + tangent * tangent)
+    way = results["bodies/2/position"][-1, 0]
+    assert way == pytest.approx(0.5 * a * end * end, rel=1e-6)
+
+
+def test_a_stack_stands(tmp_path: Path) -> None:
+    """Cubes on each other stay, and the floor carries them all."""
+    model = decks.stack(tmp_path, [1.0] * 5, 2.0, 0.005)
+    results = mbsim.simulate(model, integrator="MOREAU", tol=1e-8)
+    for body in range(2, 7):
+        x = results[f"bodies/{body}/position"]
+        assert np.abs(x[-1] - x[0]).max() < 1e-7
+    assert results["contacts/302/force"][-1, 2] == pytest.approx(5.0 * G, rel=1e-5)
+    assert max(results[f"contacts/{c}/penetration"].max() for c in (301, 302)) < 1e-8
+
+
+@pytest.mark.parametrize("h", [0.005, 0.001])
+def test_a_rod_that_jams_gains_no_energy(tmp_path: Path, h: float) -> None:
+    """Painleve's rod, pushed against its friction, has no acceleration that obeys Coulomb's law.
+
+    It takes an impulse, turns over and comes to rest with no more energy than it had.
+    """
+    model = decks.rod(tmp_path, 1.6, math.radians(60.0), -3.0, 1.5, h)
+    results = mbsim.simulate(model, integrator="MOREAU", tol=1e-6)
+    energy = results["energy/kinetic"] + results["energy/potential"]
+    assert energy.max() <= energy[0] * (1.0 + 1e-9)
+    assert np.abs(results["bodies/2/velocity"][-1]).max() < 1e-9
+    assert float(results["contacts/301/peak_penetration"]) < 1e-3
+
+
+def test_a_heavy_cube_rests_on_a_light_one(tmp_path: Path) -> None:
+    """A mass ratio of 1e4: it goes nowhere and presses as it weighs."""
+    model = decks.stack(tmp_path, [1.0, 1e4], 1.0, 0.005)
+    results = mbsim.simulate(model, integrator="MOREAU", tol=1e-8)
+    assert float(results["contacts/301/peak_penetration"]) < 1e-6
+    assert results["contacts/302/force"][-1, 2] == pytest.approx(10001.0 * G, rel=1e-6)
+
+
+def test_what_moreau_cannot_run_is_refused_by_name(tmp_path: Path) -> None:
+    """Rolling friction is not read as sliding friction alone."""
+    law = decks.rubbed(0.3) | {"cff_type": "COULOMB_ROLLING", "rolling_arm": 1e-3}
+    parts = [
+        decks.cube(2, 1.0, 0.2, (0.0, 0.0, 0.1)),
+        text.contact(301, [200], [100], **law),
+        text.gravity(),
+    ]
+    model = decks.model(tmp_path, parts, 1.0, 0.01)
+    with pytest.raises(ModelError, match=r"rigid.xml:\d+: Force_Contact\[301\].*MOREAU.*rolling"):
+        mbsim.simulate(model, integrator="MOREAU")
+
+
+def test_a_resumed_run_gives_the_same_bits(tmp_path: Path) -> None:
+    """Impulses and identities of points are in the checkpoint."""
+    model = decks.stack(tmp_path, [1.0, 1.0, 2.0], 0.3, 0.005)
+    whole = mbsim.simulate(model, integrator="MOREAU", output=tmp_path / "whole")
+    calls = 0
+
+    def stop(t: float, h: float, end: float) -> None:
+        nonlocal calls
+        calls += 1
+        if t > 0.1:
+            raise KeyboardInterrupt
+
+    folder = tmp_path / "parts"
+    with pytest.raises((Interrupted, KeyboardInterrupt)):
+        mbsim.simulate(model, integrator="MOREAU", output=folder, progress=stop)
+    parts = mbsim.simulate(model, integrator="MOREAU", output=folder, resume=True)
+    assert calls > 0
+    for body in (2, 3, 4):
+        name = f"bodies/{body}/position"
+        assert np.array_equal(whole[name], parts[name])
