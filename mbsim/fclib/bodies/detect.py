@@ -100,7 +100,5 @@ def rigid_bodies(
     if not rigid:
         return None
     inverse = np.ascontiguousarray(np.linalg.inv(masses))
-    system = BodySystem(
-        *compiled(body_system)(tangent, rolling, inverse, bodies, h, w, mu, mu_r)
-    )
+    system = BodySystem(*compiled(body_system)(tangent, rolling, inverse, bodies, h, w, mu, mu_r))
     return system, BodyMatrix(*compiled(empty_matrix)(system, len(inverse)))

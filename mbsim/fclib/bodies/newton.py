@@ -155,9 +155,7 @@ def linearise(
         mine[0, 0] = 1.0 / shift
         _linearise_ball(nt, 1, system.mu[a], rho[a], shift, slip[a, 0], x, f, mine, c)
         if nr > 0:
-            _linearise_ball(
-                nr, 1 + nt, system.mu_r[a], rho[a], shift, slip[a, 1], x, f, mine, c
-            )
+            _linearise_ball(nr, 1 + nt, system.mu_r[a], rho[a], shift, slip[a, 1], x, f, mine, c)
 
 
 @jitable

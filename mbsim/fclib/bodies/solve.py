@@ -68,9 +68,7 @@ def solve_contacts(
     -------
     error, scale-free residual, velocity error, sweeps done, Newton iterations done.
     """
-    system = body_system(
-        (0, 0), (), inverse, bodies, h, w.reshape(-1), mu, np.zeros(len(mu))
-    )
+    system = body_system((0, 0), (), inverse, bodies, h, w.reshape(-1), mu, np.zeros(len(mu)))
     best = r.reshape(-1)
     goal = Goal(tol, tol, unlimited())
     done, iterations = solve_system(system, len(inverse), best, goal, sweeps, newtons)

@@ -246,9 +246,7 @@ def proximal_newton(
         state[NEWTONS] += newtons
         state[STEPS] += 1
         # the error of the problem itself
-        bring_into_cones(
-            system.tangent, system.rolling, system.mu, system.mu_r, x, trial
-        )
+        bring_into_cones(system.tangent, system.rolling, system.mu, system.mu_r, x, trial)
         error, error_q = errors_at(system, trial, plain, DECIDING, work.room)
         rows = record(history, rows, state[NEWTONS], error, error_q)
         keep_best(state, goal, error, error_q, trial, r)
