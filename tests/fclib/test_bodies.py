@@ -1,4 +1,4 @@
-"""Problems of rigid bodies in their velocities: detection, sweeps, Newton, the stepping interface."""
+"""Problems of rigid bodies in their velocities: which they are, sweeps, Newton, plain arrays."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from helpers.shared_folder import shared_file
+from helpers.folders import data_file
 from mbsim.core import jit
 from mbsim.errors import ModelError
 from mbsim.fclib.bodies.solve import solve_contacts
 from mbsim.fclib.merit import judge
-from mbsim.fclib.problem import Global, Local, Solution, matrix
+from mbsim.fclib.problem import Global, Solution, matrix
 from mbsim.fclib.reduction import local, reduce
 from mbsim.fclib.solve import solve
 
@@ -83,9 +83,7 @@ def test_bodies_are_told_from_what_is_no_body():
 def test_rolling_friction_without_bodies_has_no_newton():
     problem, *_ = pile(4, 8, 5)
     full = matrix(np.eye(24) + 0.01, "triplet")
-    elastic = Global(
-        5, full, problem.H, problem.f, problem.w, problem.mu, mu_r=problem.mu_r
-    )
+    elastic = Global(5, full, problem.H, problem.f, problem.w, problem.mu, mu_r=problem.mu_r)
     with pytest.raises(ModelError, match="not for rolling friction"):
         solve(elastic, 1e-8, "PROX")
 
@@ -100,9 +98,7 @@ def test_arrays_in_and_impulses_out():
     whole = local(problem)
     w, r = whole.q.reshape(-1, 3).copy(), np.zeros((20, 3))
     run = jit.function(solve_contacts)
-    error, free, speed, sweeps, newtons = run(
-        inverse, pairs, blocks, problem.mu, w, r, 1e-10, 30, 200
-    )
+    error, free, speed, sweeps, _ = run(inverse, pairs, blocks, problem.mu, w, r, 1e-10, 30, 200)
     assert error <= 1e-10
     assert max(free, speed) <= 1e-9
     assert sweeps > 0
@@ -125,7 +121,7 @@ def test_bodies_in_the_plane_have_three_unknowns():
 
 def case(name):
     """Return a problem of `contact_problems.py` as it is given, and globally."""
-    path = shared_file("data/found/contact_problems.py")
+    path = data_file("found/contact_problems.py")
     spec = importlib.util.spec_from_file_location("contact_problems", path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
