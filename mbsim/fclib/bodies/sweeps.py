@@ -107,7 +107,8 @@ def sweep_system(
     x, v, u, room = r.copy(), np.empty((count, SIX)), np.empty(m), np.empty(m)
     work = np.empty(5 * d)
     error, error_q = body_errors(system, r, v, u, room)
-    done, rows, over = 0, 0, False
+    done, rows = 0, 0
+    over = error <= goal.tol and error_q <= goal.tol_q
     while done < sweeps and not over:
         change = 0.0
         for _ in range(min(every, sweeps - done)):
