@@ -175,31 +175,36 @@ def assemble(system: BodySystem, matrix: BodyMatrix, derivative: Vector) -> None
                     val[k, i, i] = 1.0
     part = np.empty((d, SIX))
     for a in range(len(system.mu)):
-        size = 0.0
-        for s in range(d):
+        if matrix.held[a]:
+            for other in range(2):
+                if place[a, other, other] >= 0:
+                    _add_products(system, a, other, derivative[a], place[a], part, val)
+
+
+@jitable
+def _add_products(
+    system: BodySystem, a: int, other: int, mine: Vector, place: Indices, part: Vector, val: Vector
+) -> None:
+    """Add M^-1 h' D h of contact a, with h of one of its bodies on the right, to the blocks.
+
+    `mine` (d, d) is its D, `part` (d, 6) room for D h.
+    """
+    d = len(part)
+    for s in range(d):
+        for j in range(SIX):
+            part[s, j] = 0.0
             for t in range(d):
-                size += abs(derivative[a, s, t])
-        if size == 0.0:
+                part[s, j] += mine[s, t] * system.h[a, other, t, j]
+    for side in range(2):
+        k = place[side, other]
+        if k < 0:
             continue
-        for other in range(2):
-            if place[a, other, other] < 0:
-                continue
-            for s in range(d):
-                for j in range(SIX):
-                    total = 0.0
-                    for t in range(d):
-                        total += derivative[a, s, t] * system.h[a, other, t, j]
-                    part[s, j] = total
-            for side in range(2):
-                k = place[a, side, other]
-                if k < 0:
-                    continue
-                for i in range(SIX):
-                    for j in range(SIX):
-                        total = 0.0
-                        for s in range(d):
-                            total += system.pull[a, side, i, s] * part[s, j]
-                        val[k, i, j] += total
+        for i in range(SIX):
+            for j in range(SIX):
+                total = 0.0
+                for s in range(d):
+                    total += system.pull[a, side, i, s] * part[s, j]
+                val[k, i, j] += total
 
 
 @jitable

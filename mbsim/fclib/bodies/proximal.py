@@ -184,11 +184,9 @@ def newton_on_bodies(
 @jitable
 def body_work(matrix: BodyMatrix) -> float:
     """Return the estimated seconds of a Newton iteration with this matrix (`factor_work`)."""
-    return (
-        factor_work(matrix.flops, 4 * len(matrix.col))
-        + 1e-9 * matrix.analysis.factor_ptr[-1]
-        + 5e-7 * len(matrix.held)
-    )
+    entries = float(matrix.analysis.factor_ptr[-1])
+    factors = factor_work(matrix.flops, 4 * len(matrix.col))
+    return factors + 1e-9 * entries + 5e-7 * len(matrix.held)
 
 
 @jitable

@@ -24,62 +24,72 @@ if TYPE_CHECKING:
 
 
 @jitable
+def _feel(h: Vector, a: int, side: int, motion: Vector, d: int, out: Vector) -> None:
+    """Add what a contact feels of a body's velocity to its own."""
+    for k in range(d):
+        for i in range(SIX):
+            out[k] += h[a, side, k, i] * motion[i]
+
+
+@jitable
+def _push(pull: Vector, a: int, side: int, change: Vector, d: int, motion: Vector) -> None:
+    """Add the change of a body's velocity by the change of an impulse."""
+    for i in range(SIX):
+        total = 0.0
+        for k in range(d):
+            total += pull[a, side, i, k] * change[k]
+        motion[i] += total
+
+
+@jitable
+def _one_contact(system: BodySystem, a: int, b: Vector, r: Vector, work: Vector) -> None:
+    """Solve contact a, whose velocity is own r + b, in place."""
+    tangent, rolling, own, mu = system.tangent, system.rolling, system.own, system.mu[a]
+    first = (1 + len(tangent) + len(rolling)) * a
+    if len(rolling) > 0:
+        contact_rolling(tangent, rolling, own, a, b, mu, system.mu_r[a], r, first, work)
+    elif len(tangent) == 1:
+        r[first], r[first + 1] = contact_2d(own, a, b[0], b[1], mu, r[first], r[first + 1])
+    else:
+        r[first], r[first + 1], r[first + 2] = contact_3d(
+            own, a, b[0], b[1], b[2], mu, r[first], r[first + 1], r[first + 2]
+        )
+
+
+@jitable
 def sweep_bodies(system: BodySystem, r: Vector, v: Vector, work: Vector) -> float:
     """Solve every contact once; v (bodies, 6) goes with r, in and out.
 
-    `work` has room for 5 d numbers. Returns the largest change of an impulse over its size.
+    `work` has room for 5 d numbers. Returns the change of r over |r|.
     """
-    tangent, rolling = system.tangent, system.rolling
-    bodies, h, pull, own, mu = system.bodies, system.h, system.pull, system.own, system.mu
-    d = 1 + len(tangent) + len(rolling)
+    d = 1 + len(system.tangent) + len(system.rolling)
+    b, step = work[:d], work[d : 2 * d]
     change, size = 0.0, 0.0
-    for a in range(len(mu)):
+    for a in range(len(system.mu)):
         first = d * a
-        one, two = bodies[a, 0], bodies[a, 1]
+        one, two = system.bodies[a, 0], system.bodies[a, 1]
         for k in range(d):
-            total = system.w[first + k]
+            b[k] = system.w[first + k]
             for j in range(d):
-                total -= own[a, k, j] * r[first + j]
-            if one >= 0:
-                for i in range(SIX):
-                    total += h[a, 0, k, i] * v[one, i]
-            if two >= 0:
-                for i in range(SIX):
-                    total += h[a, 1, k, i] * v[two, i]
-            work[k] = total
+                b[k] -= system.own[a, k, j] * r[first + j]
+        if one >= 0:
+            _feel(system.h, a, 0, v[one], d, b)
+        if two >= 0:
+            _feel(system.h, a, 1, v[two], d, b)
         for k in range(d):
-            work[d + k] = r[first + k]
-        if len(rolling) > 0:
-            contact_rolling(
-                tangent, rolling, own, a, work, mu[a], system.mu_r[a], r, first, work[2 * d :]
-            )
-        elif len(tangent) == 1:
-            r[first], r[first + 1] = contact_2d(
-                own, a, work[0], work[1], mu[a], r[first], r[first + 1]
-            )
-        else:
-            r[first], r[first + 1], r[first + 2] = contact_3d(
-                own, a, work[0], work[1], work[2], mu[a], r[first], r[first + 1], r[first + 2]
-            )
+            step[k] = -r[first + k]
+        _one_contact(system, a, b, r, work[2 * d :])
         moved = 0.0
         for k in range(d):
-            work[d + k] = r[first + k] - work[d + k]
-            moved += work[d + k] ** 2
+            step[k] += r[first + k]
+            moved += step[k] ** 2
             size += r[first + k] ** 2
         change += moved
         if moved > 0.0:
             if one >= 0:
-                for i in range(SIX):
-                    total = 0.0
-                    for k in range(d):
-                        total += pull[a, 0, i, k] * work[d + k]
-                    v[one, i] += total
+                _push(system.pull, a, 0, step, d, v[one])
             if two >= 0:
-                for i in range(SIX):
-                    total = 0.0
-                    for k in range(d):
-                        total += pull[a, 1, i, k] * work[d + k]
-                    v[two, i] += total
+                _push(system.pull, a, 1, step, d, v[two])
     return math.sqrt(change / size) if size > 0.0 else math.sqrt(change)
 
 
@@ -97,7 +107,8 @@ def sweep_system(
     x, v, u, room = r.copy(), np.empty((count, SIX)), np.empty(m), np.empty(m)
     work = np.empty(5 * d)
     error, error_q = body_errors(system, r, v, u, room)
-    done, rows, over = 0, 0, False
+    done, rows = 0, 0
+    over = error <= goal.tol and error_q <= goal.tol_q
     while done < sweeps and not over:
         change = 0.0
         for _ in range(min(every, sweeps - done)):

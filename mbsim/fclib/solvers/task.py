@@ -24,6 +24,9 @@ POLISHED = 0.1
 #: Times its goal above which the second figure says that the first was met by its units alone: a
 #: heavy body's impulses make it small at once.
 FAR_OFF = 10.0
+#: Seconds that it gets at least where Newton's steps are in body space: they settle what sweeps
+#: leave of weak contacts.
+PATIENCE = 1.0
 #: Rows of a history that one call of a kernel may add.
 ROWS = 400
 
@@ -162,7 +165,9 @@ class Task:
             if self.error_q < GAINED * self.graced_at:
                 self.graced_at = self.error_q
                 more = 0.05 + 0.5 * self.reached
-                if self.error_q <= FAR_OFF * self.tol_q:
+                if self.blocks.rigid is not None:
+                    more = PATIENCE + 20.0 * self.reached
+                elif self.error_q <= FAR_OFF * self.tol_q:
                     more = min(20.0 * self.reached + 2e-5, more)
                 self.grace = self.work + more
         return better
