@@ -5,10 +5,11 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
 from mbsim import __version__
 from mbsim.errors import Interrupted, ModelError, ResultsError
@@ -70,9 +71,68 @@ def _parameters(system: System, settings: Settings) -> list[Parameters]:
     return stages
 
 
-def simulate(
+class Prepared(NamedTuple):
+    """A model made ready to run: its arrays, and what is said of it."""
+
+    system: System
+    said: list[str]  # lines for the log
+    attributes: dict[str, str | float | int]  # of a result file
+    changes: list[Parameters]  # of every stage, where commands change elements
+
+
+def _check_plugins(files: Sequence[Path]) -> None:
+    """Raise `ModelError` where a file of `plugins` is not there."""
+    for file in files:
+        if not file.is_file():
+            raise ModelError(f"--plugin {file}: no such file")
+
+
+def prepare(
     model: Model,
+    settings: Settings,
+    files: list[Path],
+    detector: str,
+    interpret: bool,
+    scripts: bool,
+    tell: Notify,
+) -> Prepared:
+    """Return a model as a system, having told the user what is about to run.
+
+    Parameters
+    ----------
+    model : Model
+    settings : Settings
+    files : list of Path
+        With user subroutines.
+    detector, interpret, scripts
+        As `detector`, `interpret_plugins` and `scripts` of `simulate`.
+    tell : callable
+        Called with lines for the user.
+    """
+    from mbsim.compile_model.build import build
+    from mbsim.core import jit
+    from mbsim.plugins.permission import no_scripts
+
+    jit.on_first_compile = lambda: tell(
+        "compiling what this model needs (a quarter of a minute to one); later runs load it"
+    )
+    jit.compiled = jit.expected = 0
+    jit.on_plan = lambda: tell(f"compiling: {jit.expected - jit.compiled} functions are left")
+    _check_plugins(files)
+    said: list[str] = []
+    with no_scripts(not scripts):
+        system = build(model, files, interpret, detector, said.append)
+    changes = _parameters(system, settings)
+    said += _announce(system, settings, said, tell)
+    return Prepared(
+        system, said, _attributes(system, settings, detector, files, interpret), changes
+    )
+
+
+def simulate(
+    model: Model | str | PathLike[str] | IO[str] | IO[bytes],
     *,
+    overrides: Mapping[str, object] | Sequence[str] = (),
     end_time: float | None = None,
     print_interval: float | None = None,
     integrator: str | None = None,
@@ -96,8 +156,10 @@ def simulate(
 
     Parameters
     ----------
-    model : Model
-        As `read_model` returns it.
+    model : Model, path, or XML
+        As `read_model` takes it, or what that returned.
+    overrides : mapping or sequence of str
+        As of `read_model`, where the model is not read yet.
     end_time, print_interval : float, optional
         Instead of the deck's [T]; of an Adams deck both are needed.
     integrator : str, optional
@@ -135,35 +197,25 @@ def simulate(
     ModelError, SolverError, PluginError, ResultsError, Interrupted
         What was recorded up to there is kept.
     """
-    from mbsim.compile_model.build import build
     from mbsim.core import jit
-    from mbsim.plugins.permission import no_scripts
+    from mbsim.reader.xml import as_model
     from mbsim.results.log import RunLog
     from mbsim.results.recorder import Recorder
     from mbsim.results.resume import completed
 
     began = time.perf_counter()
+    model = as_model(model, overrides)
     settings = settle(model, end_time, print_interval, integrator, tol)
     tell = notify or (lambda line: None)
-    jit.on_first_compile = lambda: tell(
-        "compiling what this model needs (a quarter of a minute to one); later runs load it"
-    )
-    jit.compiled = jit.expected = 0
-    jit.on_plan = lambda: tell(f"compiling: {jit.expected - jit.compiled} functions are left")
     compiled_before = jit.compile_seconds
     files = [Path(file) for file in plugins]
-    for file in files:
-        if not file.is_file():
-            raise ModelError(f"--plugin {file}: no such file")
     folder = None if output is None else Path(output)
-    if resume and folder is not None and (whole := completed(model, folder, tell)) is not None:
-        return whole
-    said: list[str] = []
-    with no_scripts(not scripts):
-        system = build(model, files, interpret_plugins, detector, said.append)
-    changes = _parameters(system, settings)
-    said += _announce(system, settings, said, tell)
-    attributes = _attributes(system, settings, detector, files, interpret_plugins)
+    if resume and folder is not None:
+        _check_plugins(files)
+        if (whole := completed(model, folder, tell)) is not None:
+            return whole
+    made = prepare(model, settings, files, detector, interpret_plugins, scripts, tell)
+    system, said, attributes, changes = made
     attributes["signals"] = "\n".join(signals)
     recorder = Recorder(system, attributes, folder, resume, settings, signals)
     try:
