@@ -150,12 +150,12 @@ class Inputs(MutableMapping[str, float]):
             self._operand[place] = value
 
     def __getitem__(self, name: str) -> float:
-        return float(self._number[self._row(name)])
+        return float(self._number[self.row_of(name)])
 
     def __setitem__(self, name: str, value: float) -> None:
         row = self._rows.get(name)
         if row is None:
-            row = self._row(name)
+            row = self.row_of(name)
         value = float(value)
         if value == self._number[row]:
             return
@@ -179,7 +179,7 @@ class Inputs(MutableMapping[str, float]):
     def _ipython_key_completions_(self) -> list[str]:
         return list(self)
 
-    def _row(self, name: str) -> int:
+    def row_of(self, name: str) -> int:
         """Return the row of an input."""
         if name in self._rows:
             return self._rows[name]

@@ -80,7 +80,7 @@ class Stepper(Runner):
         self._budget, self._closed, self._failed = FIRST_BUDGET, False, False
         self._at = np.zeros(len(self.method.y))
         self.inputs = Inputs(system.model, system.scene, names, self._input_changed)
-        self._of_motion = self._moving_inputs()
+        self.moving_inputs = self._moving_inputs()
         self.signals = SignalsNow(system, lambda: self.time, self.method.y, self._row_now)
 
     # -- what a caller does ---------------------------------------------------------------------
@@ -305,7 +305,7 @@ class Stepper(Runner):
         self._fresh = True
         self._memory[scheme.HAVE_F] = 0.0
         self.system.scene.audit.tally[ANEW] = 1.0
-        if row in self._of_motion:
+        if row in self.moving_inputs:
             from mbsim.run.start import assemble_again
 
             assemble_again(self.system, self.hooks, self.time, self.method.y)
@@ -314,6 +314,10 @@ class Stepper(Runner):
             self._memory[scheme.ROW_ENDS] = -np.inf
             self._memory[scheme.HORIZON] = np.inf
             self.method.counts[scheme.ROW] = len(self.method.timetable)
+
+    def changed(self) -> None:
+        """Let signals be evaluated anew: y is another."""
+        self._fresh = True
 
     def _row_now(self) -> int:
         """Return which row of the scene's tables holds the present time; it is not taken."""
