@@ -24,7 +24,7 @@ Array = np.ndarray[Any, Any]
 _SIZE = 12
 _KINDS = ("position", "turn", "velocity", "angular_velocity")
 #: Singular values below this part of the largest are none.
-_RANK = 1e-9
+_RANK = 1e-6
 #: By how much A may differ between two c, and from differences, over its largest number.
 _AGREES, _DIFFERS = 1e-6, 1e-3
 #: Half of the step of differences, of lengths and speeds over the model's own.
@@ -111,6 +111,16 @@ class _Point:
             self.run.hooks.must(self.run.problem.project, self.t, y, y.copy())
         return y
 
+    def free(self) -> Array:
+        """Return by columns what becomes of each change on its way back onto the constraints."""
+        m = len(self.scale)
+        found = np.zeros((m, m))
+        for k in range(m):
+            change = _STEP * np.eye(m)[k] * self.scale
+            d = self.moved(change) - self.moved(-change)
+            found[:, k] = self.lowered(d) / self.scale / (2.0 * _STEP)
+        return found
+
     def resolvent(self, c: float, problem: Any) -> Array:
         """Return R = (c I - J)^-1 of changes that `lifted` takes, as far as constraints let it."""
         hooks, f = self.run.hooks, self.f(self.y)
@@ -137,18 +147,18 @@ def _turn_of(q: Array, d: Array) -> Array:
     return 2.0 * (q[0] * d[1:] - d[0] * q[1:] - np.cross(q[1:], d[1:]))
 
 
-def _independent(R: Array, nb: int) -> tuple[list[int], Array]:
+def _independent(free: Array, nb: int) -> tuple[list[int], Array]:
     """Return numbers that fix a state which keeps to the constraints, and all as they follow.
 
     Positions are chosen first, as far apart as they are, then velocities, then states.
     """
     from scipy.linalg import qr
 
-    u, size, _ = np.linalg.svd(R)
+    u, size, _ = np.linalg.svd(free)
     rank = int(np.count_nonzero(size > _RANK * size[0])) if len(size) else 0
     basis = u[:, :rank]
-    of_body = np.arange(len(R)) < _SIZE * nb
-    place = np.arange(len(R)) % _SIZE < _SIZE // 2
+    of_body = np.arange(len(free)) < _SIZE * nb
+    place = np.arange(len(free)) % _SIZE < _SIZE // 2
     chosen: list[int] = []
     left = basis
     for group in (of_body & place, of_body & ~place, ~of_body):
@@ -199,8 +209,8 @@ def _linearized(run: Stepper, outputs: tuple[str, ...], inputs: tuple[str, ...])
     problem, lives = implicit_hooks(run.system.scene, run.problem, False)
     point = _Point(run)
     rate = float(run.system.scene.world.scale[1] / run.system.scene.world.scale[0])
+    chosen, V = _independent(point.free(), point.nb)
     first = point.resolvent(rate, problem)
-    chosen, V = _independent(first, point.nb)
     A = rate * np.eye(len(chosen)) - np.linalg.inv((first @ V)[chosen])
     c = 1.5 * max(rate, float(np.abs(np.linalg.eigvals(A)).max(initial=0.0)))
     again = c * np.eye(len(chosen)) - np.linalg.inv((point.resolvent(c, problem) @ V)[chosen])

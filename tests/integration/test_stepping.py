@@ -26,7 +26,8 @@ PUSHED = """<MotionSolve><Model>
 <Constraint_Joint id="1" type="TRANSLATIONAL" i_marker_id="20" j_marker_id="10"/>
 <Force_Vector_OneBody id="1" type="FORCEONLY" i_marker_id="20" fx_expression="0"
   fy_expression="0" fz_expression="VARVAL(5) - VARVAL(6)*DZ(20,10){force}"/>
-<Post_Request id="1" type="EXPRESSION" f2="VARVAL(5)" f3="VARVAL(7)" f4="DZ(20,10)"/>
+<Post_Request id="1" type="EXPRESSION" expr2="VARVAL(5)" expr3="VARVAL(7)"
+  expr4="DZ(20,10)"/>
 {more}
 </Model><Command>
 <Simulate analysis_type="Transient" end_time="1" print_interval="0.01"/>
