@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from mbsim.reader.xml import read_model
     from mbsim.results.reading import open_results
     from mbsim.run.simulation import simulate
-    from mbsim.run.stepping import open_model as open  # noqa: A004
+    from mbsim.run.stepping import open_model as open
 
 __version__ = "0.1.0"
 

@@ -167,6 +167,9 @@ class Inputs(MutableMapping[str, float]):
     def __delitem__(self, name: str) -> None:
         raise TypeError("inputs are the model's: their values can be set, none taken out")
 
+    def __contains__(self, name: object) -> bool:
+        return name in self._rows
+
     def __iter__(self) -> Iterator[str]:
         return (self._shown[k] for k in range(self._count))
 

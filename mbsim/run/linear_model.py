@@ -1,8 +1,8 @@
 """A run's model linearised where it stands: x' = A x + B u, y = C x + D u.
 
 A is that of the linearisation by which implicit methods solve (`dynamics.linearization`): with
-R = (c I - J)^-1 as they have it, V a basis of the states that keep to the constraints and R V = V r,
-A = c I - r^-1. It is taken by two c, and held against differences of f. B, C and D are central
+R = (c I - J)^-1 as they have it, V a basis of the states that keep to the constraints, and
+R V = V r, A is c I - r^-1. It is taken by two c, and held against differences of f. B, C and D are central
 differences: of forces that are linear in u exact but for rounding.
 """
 
@@ -72,7 +72,9 @@ class _Point:
         rows = [length] * 3 + [1.0] * 3 + [speed] * 3 + [speed / length] * 3
         self.scale = np.array(rows * self.nb + [1.0] * len(self.states))
         ids, diffs = run.system.body_ids, list(run.system.model.differentials)
-        self.names = [f"bodies/{id}/{kind}/{axis}" for id in ids for kind in _KINDS for axis in "xyz"]
+        self.names = [
+            f"bodies/{id}/{kind}/{axis}" for id in ids for kind in _KINDS for axis in "xyz"
+        ]
         self.names += [f"diffs/{id}/value" for id in diffs]
         self.names += [f"state/{k}" for k in range(len(diffs), len(self.states))]
 
@@ -204,7 +206,9 @@ def _linearized(run: Stepper, outputs: tuple[str, ...], inputs: tuple[str, ...])
             'leave it out (inputs=[...]), or let it give an acceleration (val_type="A")'
         )
     if run.methods.explicit.order == 0.0:
-        raise ModelError("linearize: VERLET's forces follow from its step; open with another method")
+        raise ModelError(
+            "linearize: VERLET's forces follow from its step; open with another method"
+        )
     # the scene's hooks are one; those of a running implicit method are bound again by its state
     problem, lives = implicit_hooks(run.system.scene, run.problem, False)
     point = _Point(run)
@@ -226,7 +230,9 @@ def _linearized(run: Stepper, outputs: tuple[str, ...], inputs: tuple[str, ...])
         over = (_read(run, y, outputs) for y in ends)
         C[:, k] = np.subtract(*over) / (2.0 * _STEP)
     if np.abs(A - again).max(initial=0.0) > _AGREES * size * len(A):
-        raise SolverError(_unfit(run, "the linearisation depends on the coefficient it is solved by"))
+        raise SolverError(
+            _unfit(run, "the linearisation depends on the coefficient it is solved by")
+        )
     if np.abs(A - slopes).max(initial=0.0) > _DIFFERS * size:
         raise SolverError(_unfit(run, "differences of the equations give other slopes"))
     B = np.zeros((len(chosen), len(inputs)))
@@ -280,4 +286,3 @@ def _by_input(run: Stepper, point: _Point, row: int, outputs: tuple[str, ...]) -
         found.append((point.lowered(point.f(point.y)), _read(run, point.y, outputs)))
     run.inputs.put(row, value)
     return found[0][0], found[1][0], found[0][1], found[1][1]
-

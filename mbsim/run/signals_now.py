@@ -170,8 +170,10 @@ class SignalsNow(Mapping[str, Any]):
         for k, (statement, other) in enumerate(acting(system)):
             if GROUPS[statement].path == group and other == id and last in _OF_ELEMENTS:
                 held = len(system.connections)
-                row, table = (k, rows.joint) if k < held else (k - held, rows.applied)
-                return _row_part(lambda: table[evaluate()], 6 * row, _OF_ELEMENTS[last])
+                part = _OF_ELEMENTS[last]
+                if k < held:
+                    return _row_part(lambda: rows.joint[evaluate()], 6 * k, part)
+                return _row_part(lambda: rows.applied[evaluate()], 6 * (k - held), part)
         unknowns = dict(system.unknowns())
         column = unknowns[f"{group}/{id}/{last}"]
         return lambda: float(rows.value[evaluate(), column])

@@ -86,8 +86,13 @@ class Stepper(Runner):
     # -- what a caller does ---------------------------------------------------------------------
 
     def step(self, dt: float) -> float:
-        """Go on by a time [T]; return the time reached, which a sensor may have ended early."""
-        return self.step_to(float(self._memory[scheme.TIME]) + dt)
+        """Go on by a time [T], at most to the end; return the time reached.
+
+        A sensor may have ended it early. Steps whose sum is the end but for rounding end there.
+        """
+        now, end = float(self._memory[scheme.TIME]), self.settings.end_time
+        t = now + dt
+        return self.step_to(end if now < end < t + _ROUNDED * dt else t)
 
     def step_to(self, t: float) -> float:
         """Go on to a time [T]; return the time reached, which a sensor may have ended early.
