@@ -1,9 +1,9 @@
 """A run's model linearised where it stands: x' = A x + B u, y = C x + D u.
 
-A is that of the linearisation by which implicit methods solve (`dynamics.linearization`): with
+A is that of the linearisation by which implicit methods solve (`dynamics.linearization`). With
 R = (c I - J)^-1 as they have it, V a basis of the states that keep to the constraints, and
-R V = V r, A is c I - r^-1. It is taken by two c, and held against differences of f. B, C and D are central
-differences: of forces that are linear in u exact but for rounding.
+R V = V r, it is c I - r^-1. It is taken by two c, and held against differences of f. B, C and D are
+central differences: of forces that are linear in u exact but for rounding.
 """
 
 from __future__ import annotations
