@@ -44,8 +44,8 @@ class History:
     directory = None
 
     def __init__(self, system: System, attributes: Mapping[str, Value], how: Any) -> None:
-        self.system, self.chain = system, None
-        self.chain: Chain | None
+        self.system = system
+        self.chain: Chain | None = None
         self._attributes, self._how = attributes, how
         self._posts = ContactPosts(system, system.posts) if system.posts else None
 
@@ -68,7 +68,7 @@ class History:
 
     def _all(self) -> Block:
         """Return all rows as one block, which the chain is from then on."""
-        blocks, chain = [], self.chain
+        blocks, chain = list[Block](), self.chain
         while chain is not None:
             blocks.append(chain.block)
             chain = chain.before
@@ -80,7 +80,8 @@ class History:
             whole = Block(**{name: np.concatenate(each) for name, each in tables.items()})
             self.chain = Chain(whole, None)
             return whole
-        return blocks[0]
+        whole = blocks[0]
+        return whole
 
     def results(
         self, folder: Path | None, status: str, stats: Mapping[str, Value], audit: Audit | None

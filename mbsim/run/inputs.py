@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _TABLES = {"variables": "Reference_Variable", "motions": "Motion_Joint"}
 
 
-def seen_through(model: Model, expression: Expression) -> Iterator[int]:
+def _seen_through(model: Model, expression: Expression) -> Iterator[int]:
     """Yield the variables that an expression uses, those that they use included."""
     waiting, seen = [expression], set[int]()
     while waiting:
@@ -43,12 +43,10 @@ def seen_through(model: Model, expression: Expression) -> Iterator[int]:
 def _holding(model: Model) -> dict[int, str]:
     """Return the variables on which positions depend that constraints hold, and which do."""
     found: dict[int, str] = {}
-    held = [m for m in model.motions.values() if m.val_type == "D" and m.expr is not None]
-    for element in (*held, *model.general_constraints.values()):
-        statement = getattr(element, "statement", "Constraint_General")
-        name = element_name(model.file, statement, element.id)
-        assert element.expr is not None
-        for id in seen_through(model, element.expr):
+    # motions are of TIME alone
+    for element in model.general_constraints.values():
+        name = element_name(model.file, "Constraint_General", element.id)
+        for id in _seen_through(model, element.expr):
             found.setdefault(id, name)
     return found
 

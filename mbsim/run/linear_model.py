@@ -56,7 +56,7 @@ class LinearModel:
     @property
     def eigenvalues(self) -> Array:
         """Eigenvalues of A [1/T], by their real parts, largest first."""
-        found = np.linalg.eigvals(self.A)
+        found: Array = np.linalg.eigvals(self.A)
         return found[np.lexsort((found.imag, -found.real))]
 
 
@@ -227,8 +227,8 @@ def _linearized(run: Stepper, outputs: tuple[str, ...], inputs: tuple[str, ...])
         ends = [point.moved(change), point.moved(-change)]
         up, down = (point.lowered(point.f(y)) / scale for y in ends)
         slopes[:, k] = (up - down)[chosen] / (2.0 * _STEP)
-        over = (_read(run, y, outputs) for y in ends)
-        C[:, k] = np.subtract(*over) / (2.0 * _STEP)
+        seen = [_read(run, y, outputs) for y in ends]
+        C[:, k] = (seen[0] - seen[1]) / (2.0 * _STEP)
     if np.abs(A - again).max(initial=0.0) > _AGREES * size * len(A):
         raise SolverError(
             _unfit(run, "the linearisation depends on the coefficient it is solved by")

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 Get = Callable[[], Any]
 _OF_BODIES = {"position": (0, AT_Q), "quaternion": (AT_Q, AT_V), "velocity": (AT_V, AT_W)}
-_OF_CONTACTS = {
+_OF_CONTACTS: dict[str, slice | int] = {
     "force": slice(CONTACT_FORCE, CONTACT_FORCE + 3),
     "torque": slice(CONTACT_TORQUE, CONTACT_TORQUE + 3),
     "penetration": CONTACT_DEPTH,

@@ -291,19 +291,7 @@ class Stepper(Runner):
             row
             for row, each in enumerate(self.system.model.inputs)
             if each.table == "motions" and motions[each.id].val_type == "V"
-        ) | self._by_variables("V")
-
-    def _by_variables(self, level: str) -> frozenset[int]:
-        """Return the inputs that motions of a level look at by variables."""
-        from mbsim.run.inputs import seen_through
-
-        model = self.system.model
-        rows = {each.id: k for k, each in enumerate(model.inputs) if each.table == "variables"}
-        found = set()
-        for motion in model.motions.values():
-            if motion.val_type == level and motion.expr is not None:
-                found |= {rows[id] for id in seen_through(model, motion.expr) if id in rows}
-        return frozenset(found)
+        )
 
     def _input_changed(self, row: int) -> None:
         """Let nothing be left of what acted before."""

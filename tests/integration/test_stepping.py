@@ -263,15 +263,14 @@ def test_motions_as_inputs(method):
 def test_what_would_make_positions_jump_is_no_input():
     with pytest.raises(ModelError, match=r'Motion_Joint\[3\]: as an input.*val_type="V" or "A"'):
         mbsim.open(spun("D"), inputs=["drive"])
-    deck = (
-        spun("D")
-        .replace('expr="0"', 'expr="VARVAL(1)*TIME"')
-        .replace("<Motion_Joint", '<Reference_Variable id="1" label="rate" expr="2"/><Motion_Joint')
+    held = '<Constraint_General id="9" expr="DZ(20,10)-VARVAL(8)"/>'
+    deck = pushed(more=held).replace(
+        "<Constraint_Joint", '<Reference_Variable id="8" label="lift" expr="0"/><Constraint_Joint'
     )
     with mbsim.open(deck) as sim:
-        assert dict(sim.inputs) == {}
-    with pytest.raises(ModelError, match=r"Reference_Variable\[1\].*depend on it by Motion_Joint"):
-        mbsim.open(deck, inputs=["rate"])
+        assert dict(sim.inputs) == {"push": 0.0, "spring": 100.0}
+    with pytest.raises(ModelError, match=r"Reference_Variable\[8\].*depend on it by Constraint_G"):
+        mbsim.open(deck, inputs=["lift"])
 
 
 def test_where_steps_may_not_go():
