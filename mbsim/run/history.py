@@ -80,8 +80,7 @@ class History:
             whole = Block(**{name: np.concatenate(each) for name, each in tables.items()})
             self.chain = Chain(whole, None)
             return whole
-        whole = blocks[0]
-        return whole
+        return blocks[0]
 
     def results(
         self, folder: Path | None, status: str, stats: Mapping[str, Value], audit: Audit | None

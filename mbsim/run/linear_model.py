@@ -108,7 +108,7 @@ class _Point:
 
     def moved(self, s: Array) -> Array:
         """Return the present y changed, and brought back onto the constraints."""
-        y = self.y + self.lifted(s)
+        y: Array = self.y + self.lifted(s)
         for _ in range(3):
             self.run.hooks.must(self.run.problem.project, self.t, y, y.copy())
         return y
@@ -146,7 +146,8 @@ def _times(q: Array, v: Array) -> Array:
 
 def _turn_of(q: Array, d: Array) -> Array:
     """Return twice the vector part of conj(q) d: the turn in body axes of a change of q."""
-    return 2.0 * (q[0] * d[1:] - d[0] * q[1:] - np.cross(q[1:], d[1:]))
+    turn: Array = 2.0 * (q[0] * d[1:] - d[0] * q[1:] - np.cross(q[1:], d[1:]))
+    return turn
 
 
 def _independent(free: Array, nb: int) -> tuple[list[int], Array]:
