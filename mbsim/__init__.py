@@ -1,7 +1,7 @@
 """mbsim: multibody contact simulation from MotionSolve-style decks.
 
-The public API, in whole: `read_model`, `simulate`, `open_results`, `MbsimError`; for users'
-scripts `espy`.
+The public API, in whole: `read_model`, `simulate`, `open`, `open_results`, `MbsimError`; for
+users' scripts `espy`.
 Names are imported at their first use, so that ``import mbsim`` costs nothing.
 """
 
@@ -15,17 +15,20 @@ if TYPE_CHECKING:
     from mbsim.reader.xml import read_model
     from mbsim.results.reading import open_results
     from mbsim.run.simulation import simulate
+    from mbsim.run.stepping import open_model as open
 
 __version__ = "0.1.0"
 
-__all__ = ["MbsimError", "__version__", "espy", "open_results", "read_model", "simulate"]
+__all__ = ["MbsimError", "__version__", "espy", "open", "open_results", "read_model", "simulate"]
 
+#: Module and name there of every public name.
 _HOMES = {
-    "MbsimError": "mbsim.errors",
-    "espy": "mbsim.plugins.helpers",
-    "open_results": "mbsim.results.reading",
-    "read_model": "mbsim.reader.xml",
-    "simulate": "mbsim.run.simulation",
+    "MbsimError": ("mbsim.errors", "MbsimError"),
+    "espy": ("mbsim.plugins.helpers", "espy"),
+    "open": ("mbsim.run.stepping", "open_model"),
+    "open_results": ("mbsim.results.reading", "open_results"),
+    "read_model": ("mbsim.reader.xml", "read_model"),
+    "simulate": ("mbsim.run.simulation", "simulate"),
 }
 
 
@@ -35,7 +38,8 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'mbsim' has no attribute {name!r}")
     from importlib import import_module
 
-    value = getattr(import_module(_HOMES[name]), name)
+    module, its_name = _HOMES[name]
+    value = getattr(import_module(module), its_name)
     globals()[name] = value
     return value
 

@@ -6,7 +6,8 @@ MbsimError
 ├── SolverError       3  the integrator gave up: time, reason, element
 ├── PluginError       4  a user subroutine failed while the run went on
 ├── ResultsError      5  results could not be written
-│   └── UnknownSignal 2  a name that a result file does not have
+│   ├── UnknownSignal 2  a name that a result file does not have
+│   └── NoSuchResults 2  there is no file of that name
 └── Interrupted     130  Ctrl-C (143: SIGTERM, 129: SIGHUP); results up to there are kept
 """
 
@@ -73,6 +74,12 @@ class ResultsError(MbsimError):
 
 class UnknownSignal(ResultsError):
     """A name is not one of a result file's signals; the message says which there are."""
+
+    exit_code = 2
+
+
+class NoSuchResults(ResultsError):
+    """There is no result file of that name: the argument is wrong, nothing is damaged."""
 
     exit_code = 2
 

@@ -113,6 +113,7 @@ def acting(
         model.splines,
         model.arrays,
     )
+    programs.inputs = model.inputs
     elements = [(STATEMENT, id) for id in model.force_elements]
     programs.users = {element: k for k, element in enumerate([*subroutines, *elements])}
     applied, applied_ids = applied_forces(model, table, programs, laws=runs)

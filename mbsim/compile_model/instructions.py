@@ -64,6 +64,9 @@ STATE, SENSED, USER, SPLINE = range(FIRST_MEASURE + 15, FIRST_MEASURE + 19)
 #: TIME n; x + TIME n.
 ADD_N, SUB_N, MUL_N, DIV_N, POW_N, N_SUB, N_DIV = range(SPLINE + 1, SPLINE + 8)
 TIME_N, ADD_TIME_N = range(SPLINE + 8, SPLINE + 10)
+#: A number that may change between steps, while a program is made; then a NUMBER with a row of its
+#: own, before those of all others, which nothing else is put together with.
+INPUT = SPLINE + 10
 TURNS = ("PSI", "THETA", "PHI", "YAW", "PITCH", "ROLL")
 
 BY_RIGHT = {

@@ -216,7 +216,11 @@ class _Builder:
             i, j = self.markers.turned(i, axis), self.markers.turned(j, axis)
         self.add_term(row, i, j, 1.0)
         assert motion.expr is not None
-        program = self.programs.add(motion.expr, motion, of_time=True, differentiable=True)
+        given = self.programs.input_row("motions", motion.id)
+        if given is None:
+            program = self.programs.add(motion.expr, motion, of_time=True, differentiable=True)
+        else:
+            program = self.programs.add_input(given)
         level = _LEVELS[motion.val_type]
         start = (motion.ic_disp, motion.ic_vel)
         self.sums.close(

@@ -18,6 +18,7 @@ from mbsim.compile_model.instructions import (
     DISTANCE,
     ELEMENT,
     INCLUDED,
+    INPUT,
     NET,
     OFFSET,
     ORIENT,
@@ -43,7 +44,7 @@ from mbsim.expressions.elementary import CODES, NUMBER, TIME
 from mbsim.expressions.functions import CONTACT_BY_INDEX, FUNCTIONS, SPLINE_POINTS, Kind
 from mbsim.expressions.parse import ExpressionError
 from mbsim.expressions.tree import Call, Expression, Node, Number, Time, UserResult
-from mbsim.model.elements import ArrayOfNumbers, Differential, Spline, Variable
+from mbsim.model.elements import ArrayOfNumbers, Differential, InputElement, Spline, Variable
 from mbsim.model.names import element_name
 
 #: Variables that use each other, and instructions of a program with all its variables.
@@ -79,6 +80,8 @@ class ProgramTable:
     curves: SplineTable = field(default_factory=SplineTable)
     #: Row of `arrays.Users` of each user subroutine, by statement and id of its element.
     users: Mapping[tuple[str, int], int] = field(default_factory=dict)
+    #: What the caller sets between steps; each has the row of `Programs.number` of its place here.
+    inputs: Sequence[InputElement] = ()
 
     def add(
         self,
@@ -133,6 +136,16 @@ class ProgramTable:
         self.programs.append(made)
         return len(self.programs) - 1
 
+    def input_row(self, table: str, id: int) -> int | None:
+        """Return which of the inputs an element is, None for none."""
+        elements = [(each.table, each.id) for each in self.inputs]
+        return elements.index((table, id)) if (table, id) in elements else None
+
+    def add_input(self, row: int) -> int:
+        """Return the row of a new program that is an input alone."""
+        self.programs.append([Instruction(INPUT, (row,), self.inputs[row].start)])
+        return len(self.programs) - 1
+
     def measure(self, node: Call) -> Instruction:
         """Return the instruction of a displacement or velocity of markers."""
         allowed = frozenset({Kind.DISPLACEMENT, Kind.VELOCITY})
@@ -161,7 +174,7 @@ class ProgramTable:
         rows = {element: (1, k) for k, element in enumerate(applied)}
         rows.update({element: (0, k) for k, element in enumerate(connections)})
         rows.update({("CONTACT", id): (2, k) for k, id in enumerate(contacts)})
-        numbers: dict[float, int] = {}
+        numbers = NumberTable([each.start for each in self.inputs])
         start, code = _table(self.programs, rows, numbers)
         shortened = [quicken(program) for program in self.programs]
         quick_start, quick = _table(shortened, rows, numbers)
@@ -169,7 +182,7 @@ class ProgramTable:
         return Programs(
             start,
             code,
-            np.array(list(numbers), dtype=np.float64),
+            np.array(numbers.values, dtype=np.float64),
             np.zeros((deepest, 3)),
             quick_start,
             quick,
@@ -180,8 +193,23 @@ class ProgramTable:
         )
 
 
+class NumberTable:
+    """The numbers of programs, each once; inputs come first, whatever their values are."""
+
+    def __init__(self, inputs: list[float]) -> None:
+        self.values = list(inputs)
+        self._rows: dict[float, int] = {}
+
+    def row(self, value: float) -> int:
+        """Return the row of a number, which is no input."""
+        if value not in self._rows:
+            self._rows[value] = len(self.values)
+            self.values.append(value)
+        return self._rows[value]
+
+
 def _table(
-    programs: list[list[Instruction]], rows: Rows, numbers: dict[float, int]
+    programs: list[list[Instruction]], rows: Rows, numbers: NumberTable
 ) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
     """Return where each program starts, and all instructions; numbers are put into their table."""
     code = np.zeros((sum(map(len, programs)), 6), dtype=np.int64)
@@ -190,7 +218,9 @@ def _table(
         for op, given, value, element in program:
             if op == NUMBER:
                 # the sign of a zero counts, but neither gives another result than the other
-                given = (numbers.setdefault(value, len(numbers)),)
+                given = (numbers.row(value),)
+            elif op == INPUT:
+                op = NUMBER
             elif element is not None:
                 given = (*rows[element], *given)
             code[at, CODE_OPERATION] = op
@@ -294,6 +324,9 @@ class _Compiler:
         key, what = (node.name, id), "state" if slope else "variable"
         if key in self.made:
             return self.made[key]
+        row = None if slope else self.table.input_row("variables", id)
+        if row is not None:
+            return [Instruction(INPUT, (row,), self.table.inputs[row].start)]
         variable: Any = (self.table.differentials if slope else self.table.variables).get(id)
         if variable is None:
             raise ExpressionError(f"there is no {what} {id}", node.column)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -249,6 +249,14 @@ class Coupler:
     source: Source = Source()
 
 
+class InputElement(NamedTuple):
+    """An element whose expression is a number that the caller sets between steps."""
+
+    table: str  # of the model: variables or motions
+    id: int
+    start: float
+
+
 @dataclass(frozen=True)
 class Motion:
     """Motion_Joint, Motion_Marker, Adams' MOTION: a displacement, its first or second rate.
@@ -428,6 +436,9 @@ class Model:
     warnings: tuple[str, ...] = field(default=(), metadata=NO_RESULT)
     # what was set in the deck before it was read
     overrides: tuple[str, ...] = field(default=(), metadata=NO_RESULT)
+
+    # elements whose value the caller sets while the model runs, see `run.inputs`
+    inputs: tuple[InputElement, ...] = ()
 
     def table(self, name: str) -> Mapping[int, Any]:
         """Return the elements of a field by id, or those of a kind of `forces.catalog`."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from mbsim.errors import ModelError
 from mbsim.reader.keywords import fold, nearest
@@ -17,6 +17,28 @@ _MOST_LISTED = 12
 
 
 Known = Callable[[Node], "list[str] | None"]
+
+
+def as_texts(overrides: Mapping[str, object] | Sequence[str]) -> tuple[str, ...]:
+    """Return overrides as ``Element[id].attribute=value``; a mapping has the values beside.
+
+    Numbers are written such that they are read as they are, truth as TRUE and FALSE.
+    """
+    if not isinstance(overrides, Mapping):
+        if isinstance(overrides, str):
+            raise ModelError(f"overrides={overrides!r}: must be a list of texts, or a dict")
+        return tuple(overrides)
+    return tuple(f"{name}={_written(value)}" for name, value in overrides.items())
+
+
+def _written(value: object) -> str:
+    """Return a value as a deck has it."""
+    if isinstance(value, bool):
+        return "TRUE" if value else "FALSE"
+    if isinstance(value, (list, tuple)):
+        return " ".join(map(_written, value))
+    item = getattr(value, "item", None)  # of NumPy's numbers
+    return _written(item()) if item is not None else str(value)
 
 
 def apply_overrides(

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
+from typing import IO
 
 from mbsim.core.collection import no_collection
 from mbsim.core.stored import read_regular
@@ -17,7 +18,7 @@ from mbsim.model.names import is_adams, is_commands
 from mbsim.reader.constraints import complete_motions
 from mbsim.reader.draft import Draft
 from mbsim.reader.keywords import fold
-from mbsim.reader.overrides import apply_overrides
+from mbsim.reader.overrides import apply_overrides, as_texts
 from mbsim.reader.parse import MAX_BYTES, Node, parse
 from mbsim.reader.points import hold_points
 from mbsim.reader.statements import read_section
@@ -26,17 +27,39 @@ _COMPATIBILITY = "MOTIONSOLVE"
 _SECTIONS = ("model", "command")
 
 
+#: What a deck is called that is no file; the files that it names are looked for from here.
+_NO_FILE = "deck.xml"
+
+
+def as_model(
+    model: el.Model | str | PathLike[str] | IO[str] | IO[bytes],
+    overrides: Mapping[str, object] | Sequence[str] = (),
+) -> el.Model:
+    """Return a model as it is, or read; overrides are for one that is not read yet."""
+    if not isinstance(model, el.Model):
+        return read_model(model, overrides)
+    if overrides:
+        raise ModelError("overrides: this model is read already; give them to read_model")
+    return model
+
+
 @no_collection()
-def read_model(path: str | PathLike[str], overrides: Sequence[str] = ()) -> el.Model:
+def read_model(
+    path: str | PathLike[str] | IO[str] | IO[bytes],
+    overrides: Mapping[str, object] | Sequence[str] = (),
+) -> el.Model:
     """Return the model that a deck describes, with everything about it checked.
 
     Parameters
     ----------
-    path : path-like
+    path : path-like, text or file
         The deck: an Adams deck where it ends in .adm, an Adams command file with its deck where
-        it ends in .acf, else an XML file with <Model> and <Command> parts under any root.
-    overrides : sequence of str, optional
-        ``Element[id].attribute=value``, set in the deck before it is read.
+        it ends in .acf, else an XML file with <Model> and <Command> parts under any root. A text
+        that begins with ``<`` is the XML itself, and something with `read` is read; files that it
+        names are looked for in the current folder.
+    overrides : mapping or sequence of str, optional
+        ``{"Element[id].attribute": value}`` or ``["Element[id].attribute=value"]``, set in the
+        deck before it is read.
 
     Returns
     -------
@@ -51,9 +74,10 @@ def read_model(path: str | PathLike[str], overrides: Sequence[str] = ()) -> el.M
     ModelError
         If the file cannot be read, or an override names what is not there.
     """
-    deck = Path(path)
-    data = _read_bytes(deck)
-    draft, said_so = _read_draft(path, data, overrides)
+    texts = as_texts(overrides)
+    name, data = _given(path)
+    deck = Path(name)
+    draft, said_so = _read_draft(name, data, texts)
     complete_motions(draft)
     model = _to_model(draft, deck, hashlib.sha256(data + draft.more).hexdigest())
     known = Known(frozenset(draft.broken), draft.display_graphics)
@@ -65,7 +89,7 @@ def read_model(path: str | PathLike[str], overrides: Sequence[str] = ()) -> el.M
     if draft.faults or faults:
         raise DeckError([*draft.faults, *map(said_so, faults)])
     draft.warnings.extend(warnings)
-    return replace(_to_model(draft, deck, model.sha256), overrides=tuple(overrides))
+    return replace(_to_model(draft, deck, model.sha256), overrides=texts)
 
 
 def _read_draft(
@@ -142,6 +166,21 @@ def _fill(data: bytes, draft: Draft, overrides: Sequence[str]) -> None:
     hold_points(draft)
     if not any(section.key == "model" for section in sections) and not draft.faults:
         draft.fault(root.line, root.tag, "no <Model> in the deck: there is nothing to simulate")
+
+
+def _given(path: str | PathLike[str] | IO[str] | IO[bytes]) -> tuple[str | PathLike[str], bytes]:
+    """Return what a deck is called, and its bytes."""
+    if isinstance(path, str) and path.lstrip().startswith("<"):
+        return _NO_FILE, path.encode("utf-8")
+    if isinstance(path, (str, PathLike)):
+        return path, _read_bytes(Path(path))
+    read = getattr(path, "read", None)
+    if read is None:
+        raise ModelError(f"{path!r}: must be a path, XML as text, or something to read it from")
+    data = read()
+    named = getattr(path, "name", None)
+    name = named if isinstance(named, str) else _NO_FILE
+    return name, data.encode("utf-8") if isinstance(data, str) else data
 
 
 def _read_bytes(path: Path) -> bytes:

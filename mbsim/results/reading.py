@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from mbsim.errors import ResultsError, UnknownSignal
+from mbsim.errors import NoSuchResults, ResultsError, UnknownSignal
 from mbsim.results.audit import Audit, from_attributes
 from mbsim.results.damage import DAMAGE, reads, said_of
 from mbsim.results.error_reading import Errors
@@ -462,7 +462,7 @@ def open_results(path: str | Path) -> Results:
     file = Path(path)
     if not file.is_file():
         what = "is a folder" if file.is_dir() else "no such file"
-        raise ResultsError(f"{file}: {what}; a result file is named <model>.h5")
+        raise NoSuchResults(f"{file}: {what}; a result file is named <model>.h5")
     try:
         opened = opened_file(file)
     except OSError as error:

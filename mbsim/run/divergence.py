@@ -28,6 +28,20 @@ LATELY = 0.01
 _NAMES = ("displacement", "velocity", "acceleration")
 
 
+#: Compiled code comes back for progress and Ctrl-C about this often [s]; it counts evaluations,
+#: which cost from 0.2 us to whatever a user's function takes, so the count is adapted.
+RETURN_SECONDS = 0.1
+
+
+def next_budget(budget: int, done: int, elapsed: float) -> int:
+    """Return for how many evaluations to call next, after one that did so many in `elapsed` [s].
+
+    At most four times as many as before: the first calls also compile or load code.
+    """
+    wanted = RETURN_SECONDS * done / max(elapsed, 1e-9)
+    return int(min(max(wanted, 1.0), 4.0 * budget))
+
+
 class Pace:
     """Steps, time and speed of one Simulate, as far back as they are asked for."""
 

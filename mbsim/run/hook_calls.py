@@ -21,11 +21,25 @@ _JOINTS = ctypes.CFUNCTYPE(
 )
 
 
+def make_detector(system: System) -> Any:
+    """Put FCL behind its hook where a pair may need it; None where none does."""
+    if not system.needs_fcl:
+        return None
+    from mbsim.arrays.hooks import Hook
+    from mbsim.geometry.fcl_detector import FclDetector
+
+    graphics = [system.model.graphics[g] for g in system.graphic_ids]
+    detector = FclDetector(system.scene, graphics)
+    system.scene.world.hooks[Hook.FCL] = detector.address
+    return detector
+
+
 class HookCalls:
     """The hooks of one system that act or answer; `detector` says why FCL failed."""
 
     def __init__(self, system: System, problem: Problem, detector: Any) -> None:
         self.system, self.problem, self.detector = system, problem, detector
+        self._output = _HOOK(problem.output)
 
     def call(self, hook: int, t: float, h: float, a: Any, b: Any) -> int:
         """Call one of the problem's hooks; return its code or answer."""
@@ -37,6 +51,12 @@ class HookCalls:
         acts = hook not in (self.problem.commit, self.problem.output, self.problem.arrive)
         self._look_at(answer if acts else min(answer, 0), t)
         return answer
+
+    def call_output(self, t: float, h: float, a: Any, b: Any) -> None:
+        """Let a row be written; raise what fails. Asked between steps, so it is kept short."""
+        answer = self._output(self.problem.context, t, h, a.ctypes.data, b.ctypes.data)
+        if answer < 0:
+            self._look_at(answer, t)
 
     def _look_at(self, code: int, t: float) -> None:
         """Raise what a hook's code says, or its answer that is less a code."""

@@ -18,9 +18,9 @@ import numpy as np
 from mbsim.core import profile
 from mbsim.errors import Interrupted, ModelError
 from mbsim.run import checkpoint, statistics
-from mbsim.run.divergence import Pace
+from mbsim.run.divergence import Pace, next_budget
 from mbsim.run.failures import fail, give_up
-from mbsim.run.hook_calls import HookCalls
+from mbsim.run.hook_calls import HookCalls, make_detector
 from mbsim.run.options import Notify, Progress, TooMuchWork
 from mbsim.run.settings import Settings, Stage, output_times
 
@@ -31,19 +31,8 @@ if TYPE_CHECKING:
     from mbsim.results.audit import Audit
     from mbsim.run.dumping import ContactProblems
 
-#: Compiled code comes back for progress and Ctrl-C about this often [s]; it counts evaluations,
-#: which cost from 0.2 us to whatever a user's function takes, so the count is adapted.
-RETURN_SECONDS = 0.1
+#: Evaluations of the first call of compiled code, see `next_budget`.
 FIRST_BUDGET = 200
-
-
-def next_budget(budget: int, done: int, elapsed: float) -> int:
-    """Return for how many evaluations to call next, after one that did so many in `elapsed` [s].
-
-    At most four times as many as before: the first calls also compile or load code.
-    """
-    wanted = RETURN_SECONDS * done / max(elapsed, 1e-9)
-    return int(min(max(wanted, 1.0), 4.0 * budget))
 
 
 class Runner:
@@ -67,7 +56,7 @@ class Runner:
 
         self.system, self.settings, self.recorder, self.log = system, settings, recorder, log
         self.tell = tell
-        self.detector = self._make_detector()
+        self.detector = make_detector(system)
         system.scene.audit.plan[AUDIT_TOL] = settings.tol
         start = settings.stages[0].simulation.start_time
         timed = follows_time(system.scene)
@@ -108,18 +97,6 @@ class Runner:
                     f"Force_Contact[{id}]: VERLET holds friction back to a quarter of what would "
                     "stop the slip in a step: what its subroutine holds by states creeps"
                 )
-
-    def _make_detector(self) -> Any:
-        """Put FCL behind its hook where a pair may need it."""
-        if not self.system.needs_fcl:
-            return None
-        from mbsim.arrays.hooks import Hook
-        from mbsim.geometry.fcl_detector import FclDetector
-
-        graphics = [self.system.model.graphics[g] for g in self.system.graphic_ids]
-        detector = FclDetector(self.system.scene, graphics)
-        self.system.scene.world.hooks[Hook.FCL] = detector.address
-        return detector
 
     def start(self, allow_overlap: bool) -> None:
         """Assemble the model and begin with the incidents that exist."""
@@ -360,13 +337,17 @@ class Runner:
             memory[scheme.HORIZON] = np.inf
             method.counts[scheme.ROW] = len(method.timetable)
 
-    def _run_stage(self, stage: Stage, fresh: bool, progress: Progress | None) -> None:
-        """Run one Simulate statement."""
-        from mbsim.arrays.codes import ANEW, AUDIT_TOL, AUDIT_UNTIL, TOLERANCE
-        from mbsim.core import problem
-        from mbsim.integrators import scheme
+    def _enter_stage(self, stage: Stage, fresh: bool) -> bool:
+        """Let one Simulate statement hold, and begin it where it is `fresh`.
 
-        method, scene, simulation = self.method, self.system.scene, stage.simulation
+        Returns
+        -------
+        bool
+            Whether there is anything to integrate.
+        """
+        from mbsim.arrays.codes import ANEW, AUDIT_TOL, AUDIT_UNTIL, TOLERANCE
+
+        scene, simulation = self.system.scene, stage.simulation
         # the last change so far holds; a resumed run may have missed an earlier one
         for passed in self.settings.stages[: self.stage + 1]:
             if passed.simulation.gravity is not None:
@@ -376,7 +357,6 @@ class Runner:
         self._change()
         plan = scene.audit.plan
         plan[AUDIT_TOL], plan[AUDIT_UNTIL] = stage.tol, simulation.end_time
-        budget = FIRST_BUDGET if self.dump is None else 1
         if fresh:
             self.pace = self._pace()
         if fresh or stage.is_static:
@@ -387,11 +367,22 @@ class Runner:
             goes_on = self._begin_stage(stage)
             self._begun, self._before = True, None
             if not goes_on:
-                return
+                return False
         elif not self.system.model.sensors:
             last = self.stage == len(self.settings.stages) - 1
             self.sensing.begin(output_times(simulation, last), stage.h_max)
         self._look_ahead(stage, fresh)
+        return True
+
+    def _run_stage(self, stage: Stage, fresh: bool, progress: Progress | None) -> None:
+        """Run one Simulate statement."""
+        from mbsim.core import problem
+        from mbsim.integrators import scheme
+
+        method, simulation = self.method, stage.simulation
+        budget = FIRST_BUDGET if self.dump is None else 1
+        if not self._enter_stage(stage, fresh):
+            return
         # a resumed run stands there too, where the one before it had not gone on for good
         if self.stage == 0 and not method.counts[scheme.STEPS] and self.methods.may_begin_anew:
             self._first = self.checkpoint()

@@ -5,10 +5,11 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
 from mbsim import __version__
 from mbsim.core.profile import part, profiling
@@ -72,9 +73,68 @@ def _parameters(system: System, settings: Settings) -> list[Parameters]:
     return stages
 
 
-def simulate(
+class Prepared(NamedTuple):
+    """A model made ready to run: its arrays, and what is said of it."""
+
+    system: System
+    said: list[str]  # lines for the log
+    attributes: dict[str, str | float | int]  # of a result file
+    changes: list[Parameters]  # of every stage, where commands change elements
+
+
+def _check_plugins(files: Sequence[Path]) -> None:
+    """Raise `ModelError` where a file of `plugins` is not there."""
+    for file in files:
+        if not file.is_file():
+            raise ModelError(f"--plugin {file}: no such file")
+
+
+def prepare(
     model: Model,
+    settings: Settings,
+    files: list[Path],
+    detector: str,
+    interpret: bool,
+    scripts: bool,
+    tell: Notify,
+) -> Prepared:
+    """Return a model as a system, having told the user what is about to run.
+
+    Parameters
+    ----------
+    model : Model
+    settings : Settings
+    files : list of Path
+        With user subroutines.
+    detector, interpret, scripts
+        As `detector`, `interpret_plugins` and `scripts` of `simulate`.
+    tell : callable
+        Called with lines for the user.
+    """
+    from mbsim.compile_model.build import build
+    from mbsim.core import jit
+    from mbsim.plugins.permission import no_scripts
+
+    jit.on_first_compile = lambda: tell(
+        "compiling what this model needs (a quarter of a minute to one); later runs load it"
+    )
+    jit.compiled = jit.expected = 0
+    jit.on_plan = lambda: tell(f"compiling: {jit.expected - jit.compiled} functions are left")
+    _check_plugins(files)
+    said: list[str] = []
+    with no_scripts(not scripts), part("build"):
+        system = build(model, files, interpret, detector, said.append)
+    changes = _parameters(system, settings)
+    said += _announce(system, settings, said, tell)
+    return Prepared(
+        system, said, _attributes(system, settings, detector, files, interpret), changes
+    )
+
+
+def simulate(
+    model: Model | str | PathLike[str] | IO[str] | IO[bytes],
     *,
+    overrides: Mapping[str, object] | Sequence[str] = (),
     end_time: float | None = None,
     print_interval: float | None = None,
     integrator: str | None = None,
@@ -101,8 +161,10 @@ def simulate(
 
     Parameters
     ----------
-    model : Model
-        As `read_model` returns it.
+    model : Model, path, or XML
+        As `read_model` takes it, or what that returned.
+    overrides : mapping or sequence of str
+        As of `read_model`, where the model is not read yet.
     end_time, print_interval : float, optional
         Instead of the deck's [T]; of an Adams deck both are needed.
     integrator : str, optional
@@ -146,6 +208,8 @@ def simulate(
     ModelError, SolverError, PluginError, ResultsError, Interrupted
         What was recorded up to there is kept.
     """
+    from mbsim.reader.xml import as_model
+
     options = Options(
         end_time=end_time,
         print_interval=print_interval,
@@ -169,12 +233,13 @@ def simulate(
     if verify not in (False, True, "full"):
         raise ModelError(f'verify={verify!r}: False, True and "full" are allowed')
     with profiling() if profile else nullcontext():
-        results = _run(model, options)
+        read = as_model(model, overrides)
+        results = _run(read, options)
         if not verify:
             return results
         from mbsim.run.verify import verified
 
-        return verified(model, options, results, _run)
+        return verified(read, options, results, _run)
 
 
 def _settled(model: Model, options: Options) -> Settings:
@@ -186,32 +251,10 @@ def _settled(model: Model, options: Options) -> Settings:
     return tightened(settings, options.tighter, options.least_steps, options.h_most)
 
 
-def _tell_of_compiling(tell: Notify) -> None:
-    """Let the user hear when something is compiled, and how much is left."""
-    from mbsim.core import jit
-
-    jit.on_first_compile = lambda: tell(
-        "compiling what this model needs (a quarter of a minute to one); later runs load it"
-    )
-    jit.compiled = jit.expected = 0
-    jit.on_plan = lambda: tell(f"compiling: {jit.expected - jit.compiled} functions are left")
-
-
-def _files_of(options: Options) -> list[Path]:
-    """Return the files with user subroutines, which must be there."""
-    files = [Path(file) for file in options.plugins]
-    for file in files:
-        if not file.is_file():
-            raise ModelError(f"--plugin {file}: no such file")
-    return files
-
-
 def _run(model: Model, options: Options) -> Results:
     """Run a model; see `simulate`."""
-    from mbsim.compile_model.build import build
     from mbsim.compile_model.scratch import with_points
     from mbsim.core import jit
-    from mbsim.plugins.permission import no_scripts
     from mbsim.results.log import RunLog
     from mbsim.results.recorder import Recorder
     from mbsim.results.resume import completed
@@ -219,23 +262,15 @@ def _run(model: Model, options: Options) -> Results:
     began = time.perf_counter()
     settings = _settled(model, options)
     tell = options.notify or (lambda line: None)
-    _tell_of_compiling(tell)
     compiled_before = jit.compile_seconds
-    files = _files_of(options)
+    files = [Path(file) for file in options.plugins]
     folder = None if options.output is None else Path(options.output)
-    if (
-        options.resume
-        and folder is not None
-        and (whole := completed(model, folder, tell)) is not None
-    ):
-        return whole
-    said: list[str] = []
-    with no_scripts(not options.scripts), part("build"):
-        how = options.interpret_plugins, options.detector
-        system = build(model, files, *how, said.append)
-    changes = _parameters(system, settings)
-    said += _announce(system, settings, said, tell)
-    attributes = _attributes(system, settings, options.detector, files, options.interpret_plugins)
+    if options.resume and folder is not None:
+        _check_plugins(files)
+        if (whole := completed(model, folder, tell)) is not None:
+            return whole
+    how = options.detector, options.interpret_plugins, options.scripts
+    system, said, attributes, changes = prepare(model, settings, files, *how, tell)
     recorded = (*options.signals, *(["contact_points"] if options.contact_points else []))
     attributes["signals"] = "\n".join(recorded)
     if options.contact_points:

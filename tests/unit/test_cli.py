@@ -276,7 +276,7 @@ def test_info_of_results(model: str, tmp_path: Path, faked: Any) -> None:
     assert about["end_time"] == pytest.approx(0.9)
 
 
-@pytest.mark.parametrize(("name", "code"), [("none.h5", 5), ("none.xml", 2)])
+@pytest.mark.parametrize(("name", "code"), [("none.h5", 2), ("none.xml", 2)])
 def test_info_of_nothing(tmp_path: Path, name: str, code: int) -> None:
     result = call("info", str(tmp_path / name))
     assert result.exit_code == code

@@ -1,0 +1,289 @@
+"""A run's model linearised where it stands: x' = A x + B u, y = C x + D u.
+
+A is that of the linearisation by which implicit methods solve (`dynamics.linearization`). With
+R = (c I - J)^-1 as they have it, V a basis of the states that keep to the constraints, and
+R V = V r, it is c I - r^-1. It is taken by two c, and held against differences of f. B, C and D are
+central differences: of forces that are linear in u exact but for rounding.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbsim.core.layout import AT_Q, AT_V, BODY_SIZE
+from mbsim.errors import ModelError, SolverError
+
+if TYPE_CHECKING:
+    from mbsim.run.stepping import Stepper
+
+Array = np.ndarray[Any, Any]
+#: Numbers of a body: position, turn about its own axes, velocity, angular velocity.
+_SIZE = 12
+_KINDS = ("position", "turn", "velocity", "angular_velocity")
+#: Singular values below this part of the largest are none.
+_RANK = 1e-6
+#: By how much A may differ between two c, and from differences, over its largest number.
+_AGREES, _DIFFERS = 1e-6, 1e-3
+#: Half of the step of differences, of lengths and speeds over the model's own.
+_STEP = 1e-5
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """x' = A x + B u, y = C x + D u about the present state and inputs.
+
+    Attributes
+    ----------
+    A, B, C, D : ndarray
+        (n, n), (n, m), (p, n), (p, m).
+    states : tuple of str
+        ``bodies/2/position/x``; ``bodies/2/turn/z`` is a small turn about the body's own z [rad],
+        ``angular_velocity`` is about its own axes; ``diffs/3/value``.
+    inputs, outputs : tuple of str
+    """
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+    @property
+    def eigenvalues(self) -> Array:
+        """Eigenvalues of A [1/T], by their real parts, largest first."""
+        found: Array = np.linalg.eigvals(self.A)
+        return found[np.lexsort((found.imag, -found.real))]
+
+
+class _Point:
+    """The present state, and f, R and changes about it."""
+
+    def __init__(self, run: Stepper) -> None:
+        self.run, self.scene, self.t = run, run.system.scene, run.time
+        self.y = run.method.y.copy()
+        self.nb, self.n = len(self.scene.bodies.mass), len(self.y)
+        self.states = np.asarray(self.scene.states.offset, dtype=np.int64)
+        length, speed = (float(s) for s in self.scene.world.scale[:2])
+        rows = [length] * 3 + [1.0] * 3 + [speed] * 3 + [speed / length] * 3
+        self.scale = np.array(rows * self.nb + [1.0] * len(self.states))
+        ids, diffs = run.system.body_ids, list(run.system.model.differentials)
+        self.names = [
+            f"bodies/{id}/{kind}/{axis}" for id in ids for kind in _KINDS for axis in "xyz"
+        ]
+        self.names += [f"diffs/{id}/value" for id in diffs]
+        self.names += [f"state/{k}" for k in range(len(diffs), len(self.states))]
+
+    def lifted(self, s: Array) -> Array:
+        """Return the change of y (n,) for one of positions, turns, velocities and states."""
+        d = np.zeros(self.n)
+        for b in range(self.nb):
+            at, row = BODY_SIZE * b, s[_SIZE * b :]
+            d[at : at + 3] = row[:3]
+            d[at + AT_Q : at + AT_V] = 0.5 * _times(self.y[at + AT_Q : at + AT_V], row[3:6])
+            d[at + AT_V : at + BODY_SIZE] = row[6:12]
+        d[self.states] = s[_SIZE * self.nb :]
+        return d
+
+    def lowered(self, d: Array) -> Array:
+        """Return what `lifted` is given, of a change of y."""
+        s = np.zeros(len(self.scale))
+        for b in range(self.nb):
+            at, row = BODY_SIZE * b, s[_SIZE * b :]
+            row[:3] = d[at : at + 3]
+            row[3:6] = _turn_of(self.y[at + AT_Q : at + AT_V], d[at + AT_Q : at + AT_V])
+            row[6:12] = d[at + AT_V : at + BODY_SIZE]
+        s[_SIZE * self.nb :] = d[self.states]
+        return s
+
+    def f(self, y: Array) -> Array:
+        """Return y'."""
+        found = np.zeros(self.n)
+        self.run.hooks.must(self.run.problem.rhs, self.t, y.copy(), found)
+        return found
+
+    def moved(self, s: Array) -> Array:
+        """Return the present y changed, and brought back onto the constraints."""
+        y: Array = self.y + self.lifted(s)
+        for _ in range(3):
+            self.run.hooks.must(self.run.problem.project, self.t, y, y.copy())
+        return y
+
+    def free(self) -> Array:
+        """Return by columns what becomes of each change on its way back onto the constraints."""
+        m = len(self.scale)
+        found = np.zeros((m, m))
+        for k in range(m):
+            change = _STEP * np.eye(m)[k] * self.scale
+            d = self.moved(change) - self.moved(-change)
+            found[:, k] = self.lowered(d) / self.scale / (2.0 * _STEP)
+        return found
+
+    def resolvent(self, c: float, problem: Any) -> Array:
+        """Return R = (c I - J)^-1 of changes that `lifted` takes, as far as constraints let it."""
+        hooks, f = self.run.hooks, self.f(self.y)
+        # the linearisation is taken where f was just evaluated
+        hooks.must(problem.linearise, self.t, self.y.copy(), f)
+        hooks.must(problem.factor, 0.0, np.array([c, c * c, c, 0.0]), np.zeros(4))
+        m = len(self.scale)
+        found, d = np.zeros((m, m)), np.zeros(self.n)
+        for k in range(m):
+            r = self.lifted(np.eye(m)[k] * self.scale)
+            hooks.must(problem.solve, 0.0, r, d)
+            found[:, k] = self.lowered(d) / self.scale
+        return found
+
+
+def _times(q: Array, v: Array) -> Array:
+    """Return the quaternion product q (0, v)."""
+    w, u = q[0], q[1:]
+    return np.concatenate([[-u @ v], w * v + np.cross(u, v)])
+
+
+def _turn_of(q: Array, d: Array) -> Array:
+    """Return twice the vector part of conj(q) d: the turn in body axes of a change of q."""
+    turn: Array = 2.0 * (q[0] * d[1:] - d[0] * q[1:] - np.cross(q[1:], d[1:]))
+    return turn
+
+
+def _independent(free: Array, nb: int) -> tuple[list[int], Array]:
+    """Return numbers that fix a state which keeps to the constraints, and all as they follow.
+
+    Positions are chosen first, as far apart as they are, then velocities, then states.
+    """
+    from scipy.linalg import qr
+
+    u, size, _ = np.linalg.svd(free)
+    rank = int(np.count_nonzero(size > _RANK * size[0])) if len(size) else 0
+    basis = u[:, :rank]
+    of_body = np.arange(len(free)) < _SIZE * nb
+    place = np.arange(len(free)) % _SIZE < _SIZE // 2
+    chosen: list[int] = []
+    left = basis
+    for group in (of_body & place, of_body & ~place, ~of_body):
+        rows = np.flatnonzero(group)
+        if not len(rows) or not left.shape[1]:
+            continue
+        _, triangle, order = qr(left[rows].T, mode="economic", pivoting=True)
+        diagonal = np.abs(np.diag(triangle))
+        count = int(np.count_nonzero(diagonal > 1e-6))
+        chosen += rows[order[:count]].tolist()
+        # what these leave undecided
+        _, _, rest = np.linalg.svd(basis[chosen])
+        left = basis @ rest[len(chosen) :].T
+    return chosen, basis @ np.linalg.inv(basis[chosen])
+
+
+def linearize(run: Stepper, outputs: tuple[str, ...], inputs: tuple[str, ...]) -> LinearModel:
+    """Return the model of a run linearised where it stands; the run is left as it is.
+
+    Raises
+    ------
+    ModelError
+        For an input that gives a velocity: u' would stand in the equations.
+    SolverError
+        Where f has no slope there, or states that keep to the constraints do not stay what they
+        are to first order: joints of a model that moves.
+    """
+    kept = run.state
+    try:
+        return _linearized(run, outputs, inputs)
+    finally:
+        run.state = kept
+
+
+def _linearized(run: Stepper, outputs: tuple[str, ...], inputs: tuple[str, ...]) -> LinearModel:
+    from mbsim.dynamics.pipeline.problem import implicit_hooks
+
+    rows_of = {name: run.inputs.row_of(name) for name in inputs}
+    moving = [name for name, row in rows_of.items() if row in run.moving_inputs]
+    if moving:
+        raise ModelError(
+            f"linearize: {moving[0]} gives a velocity, whose rate would stand in the equations; "
+            'leave it out (inputs=[...]), or let it give an acceleration (val_type="A")'
+        )
+    if run.methods.explicit.order == 0.0:
+        raise ModelError(
+            "linearize: VERLET's forces follow from its step; open with another method"
+        )
+    # the scene's hooks are one; those of a running implicit method are bound again by its state
+    problem, lives = implicit_hooks(run.system.scene, run.problem, False)
+    point = _Point(run)
+    rate = float(run.system.scene.world.scale[1] / run.system.scene.world.scale[0])
+    chosen, V = _independent(point.free(), point.nb)
+    first = point.resolvent(rate, problem)
+    A = rate * np.eye(len(chosen)) - np.linalg.inv((first @ V)[chosen])
+    c = 1.5 * max(rate, float(np.abs(np.linalg.eigvals(A)).max(initial=0.0)))
+    again = c * np.eye(len(chosen)) - np.linalg.inv((point.resolvent(c, problem) @ V)[chosen])
+    size = max(float(np.abs(A).max(initial=0.0)), 1e-300)
+    slopes = np.zeros_like(A)
+    C = np.zeros((len(outputs), len(chosen)))
+    scale = point.scale
+    for k in range(len(chosen)):
+        change = _STEP * V[:, k] * scale
+        ends = [point.moved(change), point.moved(-change)]
+        up, down = (point.lowered(point.f(y)) / scale for y in ends)
+        slopes[:, k] = (up - down)[chosen] / (2.0 * _STEP)
+        seen = [_read(run, y, outputs) for y in ends]
+        C[:, k] = (seen[0] - seen[1]) / (2.0 * _STEP)
+    if np.abs(A - again).max(initial=0.0) > _AGREES * size * len(A):
+        raise SolverError(
+            _unfit(run, "the linearisation depends on the coefficient it is solved by")
+        )
+    if np.abs(A - slopes).max(initial=0.0) > _DIFFERS * size:
+        raise SolverError(_unfit(run, "differences of the equations give other slopes"))
+    B = np.zeros((len(chosen), len(inputs)))
+    D = np.zeros((len(outputs), len(inputs)))
+    for k, row in enumerate(rows_of.values()):
+        up, down, over, under = _by_input(run, point, row, outputs)
+        step = 2.0 * _input_step(run, row)
+        B[:, k] = ((up - down) / scale)[chosen] / step
+        D[:, k] = (over - under) / step
+    unit = scale[chosen]
+    del lives
+    return LinearModel(
+        again * unit[:, None] / unit,
+        B * unit[:, None],
+        C / unit,
+        D,
+        tuple(point.names[k] for k in chosen),
+        inputs,
+        outputs,
+    )
+
+
+def _unfit(run: Stepper, why: str) -> str:
+    return (
+        f"linearize at time {run.time:.9g}: {why}: a force has a kink here, or joints hold bodies "
+        "that move; take a state of rest or of steady motion"
+    )
+
+
+def _read(run: Stepper, y: Array, outputs: tuple[str, ...]) -> Array:
+    """Return signals at another point."""
+    if not outputs:
+        return np.zeros(0)
+    run.method.y[:] = y
+    run.changed()
+    found = [float(run.signals[name]) for name in outputs]
+    return np.array(found)
+
+
+def _input_step(run: Stepper, row: int) -> float:
+    """Return half of the step of an input's differences; forces are mostly linear in it."""
+    return max(1.0, abs(run.inputs.values_now[row])) * 2.0**-10
+
+
+def _by_input(run: Stepper, point: _Point, row: int, outputs: tuple[str, ...]) -> tuple[Array, ...]:
+    """Return y' and signals for an input that is a little larger, and a little smaller."""
+    value, step = run.inputs.values_now[row], _input_step(run, row)
+    found = []
+    for sign in (1.0, -1.0):
+        run.inputs.put(row, value + sign * step)
+        found.append((point.lowered(point.f(point.y)), _read(run, point.y, outputs)))
+    run.inputs.put(row, value)
+    return found[0][0], found[1][0], found[0][1], found[1][1]
