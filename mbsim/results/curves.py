@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,8 +16,10 @@ from mbsim.errors import ModelError, ResultsError, UnknownSignal
 from mbsim.results.elements import GROUPS
 from mbsim.results.names import PARTS
 from mbsim.results.quantities import quantity_of
-from mbsim.results.reading import Results
 from mbsim.results.units import TIME, Quantity, UnitSystem
+
+if TYPE_CHECKING:
+    from mbsim.results.reading import Results
 
 Array = np.ndarray[Any, Any]
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from mbsim.model.request_types import TYPES
-from mbsim.results.reading import Results
 from mbsim.results.units import (
     ACCELERATION,
     ENERGY,
@@ -16,6 +17,9 @@ from mbsim.results.units import (
     VELOCITY,
     Quantity,
 )
+
+if TYPE_CHECKING:
+    from mbsim.results.reading import Results
 
 #: By the last word of a signal's name.
 _BY_NAME = {

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
 from mbsim.core.layout import AT_Q, AT_V, BODY_SIZE
 from mbsim.errors import ModelError, SolverError
 
@@ -68,7 +69,8 @@ class _Point:
         self.y = run.method.y.copy()
         self.nb, self.n = len(self.scene.bodies.mass), len(self.y)
         self.states = np.asarray(self.scene.states.offset, dtype=np.int64)
-        length, speed = (float(s) for s in self.scene.world.scale[:2])
+        size = self.scene.world.scale
+        length, speed = float(size[SCALE_LENGTH]), float(size[SCALE_SPEED])
         rows = [length] * 3 + [1.0] * 3 + [speed] * 3 + [speed / length] * 3
         self.scale = np.array(rows * self.nb + [1.0] * len(self.states))
         ids, diffs = run.system.body_ids, list(run.system.model.differentials)
@@ -213,7 +215,8 @@ def _linearized(run: Stepper, outputs: tuple[str, ...], inputs: tuple[str, ...])
     # the scene's hooks are one; those of a running implicit method are bound again by its state
     problem, lives = implicit_hooks(run.system.scene, run.problem, False)
     point = _Point(run)
-    rate = float(run.system.scene.world.scale[1] / run.system.scene.world.scale[0])
+    scales = run.system.scene.world.scale
+    rate = float(scales[SCALE_SPEED] / scales[SCALE_LENGTH])
     chosen, V = _independent(point.free(), point.nb)
     first = point.resolvent(rate, problem)
     A = rate * np.eye(len(chosen)) - np.linalg.inv((first @ V)[chosen])

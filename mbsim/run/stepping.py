@@ -11,7 +11,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbsim.arrays.codes import ANEW
+from mbsim.arrays.codes import ANEW, USED_ROWS
 from mbsim.core import problem
 from mbsim.errors import ModelError
 from mbsim.integrators import scheme
@@ -316,7 +316,7 @@ class Stepper(Runner):
     def _row_now(self) -> int:
         """Return which row of the scene's tables holds the present time; it is not taken."""
         rows = self.system.scene.rows
-        row = int(rows.used[0])
+        row = int(rows.used[USED_ROWS])
         if self._fresh:
             self._open()
             used = rows.used.copy()
