@@ -79,12 +79,13 @@ class Reruns:
             self._once(self.integrator)
         if full and any(c.cff_type == "STICTION" for c in self.model.contacts.values()):
             self._once(IMPLICIT)
-        if self.apart and not any(self._positions(apart).any() for apart in self.apart):
+        if self.apart and not any(self._differs(apart) for apart in self.apart):
             # both took the same steps: tol does not govern here
             self._once(self.integrator, h_most=0.5 * self.stats["h_largest"])
 
-    def _positions(self, apart: dict[str, Any]) -> Any:
-        return np.nan_to_num(apart.get("bodies/position", np.zeros((1, 1))))
+    def _differs(self, apart: dict[str, Any]) -> bool:
+        """Whether any signal of a rerun is another than the run's."""
+        return any(np.nan_to_num(table).any() for table in apart.values())
 
     def _once(self, integrator: str, **changed: Any) -> bool:
         """Run once more and keep how far it is off; return False where it took too much work."""
