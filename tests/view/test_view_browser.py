@@ -186,10 +186,10 @@ def test_a_signal_is_found_added_and_followed(page, file):
 
 
 def test_a_picture_looks_as_it_did(text, tmp_path):
-    """Made by `mbsim view balls.h5 --png tests/view/balls.png --time 0.3 --size 480x300`."""
+    """Made by `mbsim view balls.h5 --png tests/view/balls.png --time 0.3 --size 320x200`."""
     from PIL import Image
 
-    make(text, (480, 300), png=tmp_path / "now.png", time=0.3)
+    make(text, (320, 200), png=tmp_path / "now.png", time=0.3)
     small = [
         np.asarray(Image.open(file).convert("RGB").resize((96, 60)), dtype=float)
         for file in (PICTURE, tmp_path / "now.png")
