@@ -172,7 +172,14 @@ class Audit:
 
     @property
     def line(self) -> str:
-        """The one line at a run's end."""
+        """The one line at a run's end; the balance is no measure of rigid contacts."""
+        left, deep = self.entries.get("contact_residual"), self.entries.get("penetration")
+        if left is not None:
+            depth = deep.value if deep is not None else 0.0
+            return (
+                f"contact problems are solved to a velocity of {left.value:.1g}, "
+                f"rigid shapes go {depth:.1g} deep"
+            )
         return f"balance closes to {self.balance:.1g} of {self.of:.3g} {self.unit}"
 
 

@@ -72,10 +72,9 @@ def examine_step(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> None:
     if h == 0.0:
         return
     tally[STEPS_ALL] += 1.0
-    if S.tally.count[POINTS] > 0:
-        allowed = S.plan.number[LEFT] / number[STEP_LENGTH]
-        note(scene, UNSOLVED_IMPULSES, number[RESIDUAL], allowed, t, -1)
-        examine_points(scene, S, t)
+    allowed = S.plan.number[LEFT] / number[STEP_LENGTH]
+    note(scene, UNSOLVED_IMPULSES, number[RESIDUAL], allowed, t, -1)
+    examine_points(scene, S, t)
     tally[STEPS_SINCE] += 1.0
     if tally[STEPS_SINCE] < scene.audit.plan[AUDIT_EVERY]:
         return

@@ -1,15 +1,17 @@
 """MOREAU: nonsmooth time stepping, of order 1, whose contacts are the problem's own.
 
 The problem does the step (`stepping.step`); here its error is estimated: a step and two halves of
-it, compared in positions alone, as velocities jump. The error of a step is of order 2; across an
-impact it is of order 1, which a shorter step brings down all the same. Where the deck fixes the
+it, compared in positions alone, as velocities jump; and what the polynomial of the whole step has
+in its middle, compared with the state between both halves: rows within an impact's step are that
+far off, and what meets a second time in one step is seen. The error of a step is of order 2; across
+an impact it is of order 1, which a shorter step brings down all the same. Where the deck fixes the
 step there is no estimate, and the step is that.
 """
 
 from __future__ import annotations
 
 from mbsim.core.address import call_float, call_int
-from mbsim.core.arrays import Pointer
+from mbsim.core.arrays import F1, F2, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import POSITION, VELOCITY, Problem
 from mbsim.integrators.scheme import (
@@ -22,10 +24,10 @@ from mbsim.integrators.scheme import (
     project,
 )
 
-#: Rows of k: f, the whole step, the state between both halves, which of y bend within the step.
-WHOLE, MIDDLE = 1, 2
-#: Numbers of a body's position, and of its velocity behind that.
-OF_POSITION, SHIFT = 7, 7
+#: Rows of k: f, the whole step, the state between both halves, and from there on the polynomial.
+WHOLE, MIDDLE, FITTED = 1, 2, 3
+#: Numbers of a body's position, and of its velocity behind that: v, then w in the body's axes.
+OF_POSITION, SHIFT, SPIN = 7, 7, 10
 
 
 @jitable
@@ -40,9 +42,57 @@ def one_step(p: Problem, m: Method, t: float, h: float) -> int:
 
 
 @jitable
+def bends(m: Method, h: float, i: int) -> bool:
+    """Return whether the body whose numbers begin at i met nothing in the step.
+
+    Its way is that of the mean of its velocities then, and bent as they change.
+    """
+    off, way = 0.0, 0.0
+    for c in range(i, i + 3):
+        v, u = m.y[c + SHIFT], m.trial[c + SHIFT]
+        off = max(off, abs(m.trial[c] - m.y[c] - 0.5 * h * (v + u)))
+        way = max(way, abs(0.5 * h * (u - v)))
+    return off <= 1e-6 * way
+
+
+@jitable
+def turns(q: F1, i: int) -> tuple[float, float, float, float]:
+    """Return q' = 1/2 q (0, w) of the body whose numbers begin at i."""
+    a, b, c, d = q[i + 3], q[i + 4], q[i + 5], q[i + 6]
+    x, y, z = q[i + SPIN], q[i + SPIN + 1], q[i + SPIN + 2]
+    return (
+        0.5 * (-b * x - c * y - d * z),
+        0.5 * (a * x + c * z - d * y),
+        0.5 * (a * y - b * z + d * x),
+        0.5 * (a * z + b * y - c * x),
+    )
+
+
+@jitable
+def fit_dense(m: Method, h: float, d: F2) -> None:
+    """Fill the step as straight lines, and positions of bodies that met nothing as parabolas."""
+    y, w = m.y, m.trial
+    for i in range(len(y)):
+        d[0, i] = y[i]
+        d[1, i] = w[i] - y[i]
+        d[2, i] = 0.0
+    i = 0
+    while i + SPIN + 3 <= len(y) and m.kinds[i] == POSITION:
+        if bends(m, h, i):
+            for c in range(i, i + 3):
+                d[2, c] = -0.5 * h * (w[c + SHIFT] - y[c + SHIFT])
+            first, last = turns(y, i), turns(w, i)
+            for c in range(4):
+                d[2, i + 3 + c] = -0.5 * h * (last[c] - first[c])
+        i += OF_POSITION
+        while i < len(y) and m.kinds[i] == VELOCITY:
+            i += 1
+
+
+@jitable
 def attempt(p: Problem, m: Method, t: float, h: float) -> int:
     """Fill the trial point by two halves of a step, and its error by a whole one; return a code."""
-    whole, middle = m.k[WHOLE], m.k[MIDDLE]
+    whole, middle, d = m.k[WHOLE], m.k[MIDDLE], m.k[FITTED : FITTED + 3]
     m.counts[EVALUATIONS] += 3
     code = call_int(p.step, (p.context, t, h, m.y, whole))
     if code == 0:
@@ -54,37 +104,16 @@ def attempt(p: Problem, m: Method, t: float, h: float) -> int:
     if code != 0:
         return code
     project(p, m, t + h, h, m.trial)
+    fit_dense(m, h, d)
     for i in range(len(m.y)):
-        m.error[i] = m.trial[i] - whole[i] if m.kinds[i] == POSITION else 0.0
+        m.error[i] = 0.0
+        if m.kinds[i] == POSITION:
+            end = m.trial[i] - whole[i]
+            within = d[0, i] + 0.5 * (d[1, i] + 0.5 * d[2, i]) - middle[i]
+            m.error[i] = end if abs(end) > abs(within) else within
     error = call_float(p.norm, (p.context, t, h, m.error, m.trial))
     m.memory[LAST_ERROR] = error / m.memory[TOL]
     return 0
-
-
-@jitable
-def fit_dense(m: Method, h: float) -> None:
-    """Fill the step as straight lines, of positions that velocities lead to as parabolas.
-
-    A body whose way is that of the mean of its velocities met nothing: its way is bent.
-    """
-    d, y, w = m.dense, m.y, m.trial
-    for i in range(len(y)):
-        d[0, i] = y[i]
-        d[1, i] = w[i] - y[i]
-        d[2, i] = 0.0
-    i = 0
-    while i + SHIFT + 3 <= len(y) and m.kinds[i] == POSITION:
-        off, way = 0.0, 0.0
-        for c in range(3):
-            rise = 0.5 * h * (y[i + SHIFT + c] + w[i + SHIFT + c])
-            off = max(off, abs(w[i + c] - y[i + c] - rise))
-            way = max(way, abs(0.5 * h * (w[i + SHIFT + c] - y[i + SHIFT + c])))
-        if off <= 1e-6 * way:
-            for c in range(3):
-                d[2, i + c] = -0.5 * h * (w[i + SHIFT + c] - y[i + SHIFT + c])
-        i += OF_POSITION
-        while i < len(y) and m.kinds[i] == VELOCITY:
-            i += 1
 
 
 def _attempt(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
@@ -102,10 +131,10 @@ def _attempt_fixed(context: int, t: float, h: float, a: Pointer, b: Pointer) -> 
 def _fit_dense(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """The step as a polynomial."""
     _, m = in_workspace(context)
-    fit_dense(m, h)
+    fit_dense(m, h, m.dense)
     return 0
 
 
-SCHEME = Scheme(_attempt, _fit_dense, stages=3, last=0, dense=3, order=2.0)
+SCHEME = Scheme(_attempt, _fit_dense, stages=6, last=0, dense=3, order=2.0)
 #: Where the deck fixes the step.
 FIXED_SCHEME = Scheme(_attempt_fixed, _fit_dense, stages=1, last=0, dense=3, order=0.0)

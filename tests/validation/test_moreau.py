@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import mbsim
+from helpers import rigid_decks as decks
+from helpers.folders import MODELS
 from mbsim.bench import deck as text
 from mbsim.errors import Interrupted, ModelError
-from tests.helpers import rigid_decks as decks
 
 G = 9.81
 
@@ -140,3 +141,38 @@ def test_a_resumed_run_gives_the_same_bits(tmp_path: Path) -> None:
     for body in (2, 3, 4):
         name = f"bodies/{body}/position"
         assert np.array_equal(whole[name], parts[name])
+
+
+@pytest.mark.parametrize("tol", [1e-3, 1e-5, 1e-7])
+def test_impacts_between_walls_are_told_apart_and_rows_between_them_are_right(tol: float) -> None:
+    """To and fro without gravity: nothing but impacts shortens a step, and each row is judged."""
+    model = mbsim.read_model(MODELS / "poisson_walls.xml")
+    results = mbsim.simulate(model, integrator="MOREAU", tol=tol)
+    times, speeds = [0.0, 0.1, 0.35, 0.6625, 1.053125], [-2.0, 1.6, -1.28, 1.024, -0.8192]
+    places = [0.3, 0.1, 0.5, 0.1, 0.5]
+    k = np.searchsorted(times, results["time"], side="right") - 1
+    exact = np.array(places)[k] + np.array(speeds)[k] * (results["time"] - np.array(times)[k])
+    assert np.abs(results["bodies/2/position"][:, 2] - exact).max() < 10.0 * tol
+    assert results["bodies/2/velocity"][-1, 2] == pytest.approx(-0.8192, rel=1e-12)
+    assert results.audit.line.startswith("contact problems are solved to")
+
+
+def test_rows_of_what_spins_are_right_between_steps() -> None:
+    """A free ball at 33 rad/s about y: its attitude at every row is that of the angle turned."""
+    ball = (
+        '<Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="0.004" inertia_yy="0.004" '
+        'inertia_zz="0.004" w_ic_y="33" w_ic_y_flag="TRUE"/>'
+        '<Reference_Marker id="20" body_id="2"/>'
+    )
+    deck = (
+        '<MotionSolve><Model><Body_Rigid id="1" isground="TRUE"/>'
+        f"{ball}</Model><Command>"
+        '<Simulate analysis_type="Transient" end_time="0.5" print_interval="0.0013"/>'
+        "</Command></MotionSolve>"
+    )
+    results = mbsim.simulate(deck, integrator="MOREAU", tol=1e-6)
+    half = 0.5 * 33.0 * results["time"]
+    exact = np.stack([np.cos(half), 0.0 * half, np.sin(half), 0.0 * half], axis=1)
+    found = results["bodies/2/quaternion"]
+    found *= np.sign((found * exact).sum(axis=1))[:, None]
+    assert np.abs(found - exact).max() < 1e-5
