@@ -135,7 +135,7 @@ def run(task: Task) -> None:
     if b.rigid is not None:
         rigid, b.rigid = b.rigid, None
         here = _costs(task)
-        if here.newton > LIGHT and (b.contacts > FEW or not b.rolling):
+        if here.newton > LIGHT:
             b.rigid = rigid
         else:
             costs = here
