@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from mbsim.fclib.problem import Flags, Indices
 
 
+#: Unknowns of a node from which a front of so many pivots is not joined for being one node larger.
+WIDE, JOINED = 6, 4
+
+
 class Analysis(NamedTuple):
     """Fronts of a pattern in the order of their elimination (`analyse`).
 
@@ -94,7 +98,7 @@ def analyse_last(size: int, ptr: Indices, col: Indices, d: int, last: Flags) -> 
     """
     leader = indistinguishable(size, ptr, col, last)
     order, elements, members, weight = minimum_degree(size, ptr, col, leader, last)
-    joined, own = _amalgamated(size, order, elements, weight, last)
+    joined, own = _amalgamated(size, order, elements, weight, last, d)
     top, root, first, following = _trees(size, order, elements.parent, joined)
     of_top = np.empty(size, np.int32)
     for a in range(size):
@@ -163,9 +167,11 @@ def analyse_last(size: int, ptr: Indices, col: Indices, d: int, last: Flags) -> 
 
 @jitable
 def _amalgamated(
-    size: int, order: Indices, elements: Elements, weight: Indices, last: Flags
+    size: int, order: Indices, elements: Elements, weight: Indices, last: Flags, d: int
 ) -> tuple[Indices, Indices]:
     """Join fronts with parents whose fronts are hardly larger.
+
+    With WIDE nodes a chain, whose fronts grow by one node each, must not end in a single front.
 
     Returns what each one is joined with (-1: nothing), and the pivots of what is left.
     """
@@ -177,7 +183,8 @@ def _amalgamated(
         if p >= 0 and last[c] == last[p]:
             wider = weight[p] + elements.mass[p]
             extra = wider - elements.mass[c]
-            if extra <= 1 or own[c] * extra <= 4 + wider // 8:
+            one_more = extra <= 1 and (d < WIDE or own[c] <= JOINED)
+            if one_more or own[c] * extra <= 4 + wider // 8:
                 joined[c] = p
                 own[p] += own[c]
     return joined, own

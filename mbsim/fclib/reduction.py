@@ -34,6 +34,10 @@ if TYPE_CHECKING:
     from mbsim.fclib.problem import Vector
 
 
+#: Contacts from which looking for rigid bodies is worth its time: without rolling friction, with.
+SEVERAL, FEW = 100, 11
+
+
 @dataclass(eq=False)
 class Blocks:
     """u = W r + q, W in blocks (`blocks.block_rows`), and how to get l and v from r.
@@ -132,7 +136,7 @@ def _reduce_global(problem: Global) -> Blocks:
         ptr, col, val = rows
     blocks = _blocks(problem, (ptr, col, val), q, equality)
     blocks.mass = mass
-    if p == 0:
+    if p == 0 and nc >= (SEVERAL if problem.mu_r is None else FEW):
         tangent, rolling = directions(problem)
         blocks.rigid = rigid_bodies(
             tangent, rolling, _rows(problem.M), _rows(problem.H), q, blocks.mu, blocks.mu_r

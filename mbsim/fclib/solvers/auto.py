@@ -56,6 +56,9 @@ WINDOW, SAMPLE = 240, 8
 IDLE = 3
 #: Error of a mean of centres that is a good start.
 MIDDLE = 1e-3
+#: Seconds of a Newton iteration in the contacts' impulses up to which it is not taken to the
+#: bodies' velocities: such problems are small, or chains.
+LIGHT = 2e-3
 #: Restarts without any gain after which there is nothing more to hope for.
 HOPELESS = 20
 
@@ -128,6 +131,14 @@ def run(task: Task) -> None:
     if task.over:
         return
     costs = _costs(task)
+    b = task.blocks
+    if b.rigid is not None:
+        rigid, b.rigid = b.rigid, None
+        here = _costs(task)
+        if here.newton > LIGHT:
+            b.rigid = rigid
+        else:
+            costs = here
     phases = NewtonPhases(task, costs.newton)
     if task.blocks.rolling and task.blocks.rigid is None:
         _rolling(task, costs, phases)
