@@ -228,7 +228,7 @@ def audit_of(system: System, left: float, left_time: float) -> Audit | None:
     size = float(tally[codes.LARGEST_ENERGY])
     # of a model that stands still no energy is large: what its scales say is
     usual = max(size, float(tally[codes.USUAL_ENERGY]))
-    part = balance / usual
+    part = balance / usual if usual > 0.0 else 0.0
     if part > COARSE and not any(
         entries[name].excess > 1.0 for name in ENERGIES if name in entries
     ):

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 #: Parts (`core.profile.LOOP_PARTS`) of the problem's hooks.
 PARTS_OF_PROBLEM = {
     "rhs": "evaluation",
+    "step": "evaluation",
     "project": "joints",
     "norm": "step_control",
     "check": "step_control",

@@ -28,7 +28,12 @@ def is_explicit(method):
     return method.order > 0.0 and not method.implicit
 
 
-METHODS = [name for name in catalog.SCHEMES if is_explicit(catalog.load(name))]
+METHODS = [
+    # the rigid one has the problem take its steps: tests/validation/test_moreau.py
+    name
+    for name in catalog.SCHEMES
+    if name != catalog.RIGID and is_explicit(catalog.load(name))
+]
 #: Order of the step and of the dense output.
 ORDERS = {"DOPRI5": (5, 4), "DOP853": (8, 7)}
 BOTH = pytest.mark.parametrize("name", METHODS)

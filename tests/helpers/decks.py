@@ -47,7 +47,7 @@ def run_in_pieces(model, folder, monkeypatch, pieces=(9, 14, 6), **settings):
 
     It looks as often as it can from here on.
     """
-    monkeypatch.setattr(loop, "RETURN_SECONDS", 1e-6)
+    monkeypatch.setattr("mbsim.run.divergence.RETURN_SECONDS", 1e-6)
     monkeypatch.setattr(loop, "FIRST_BUDGET", 7)
     for k, most in enumerate(pieces):
         left = [most]

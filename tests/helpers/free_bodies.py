@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from mbsim.compile_model.build import build
@@ -117,7 +119,7 @@ def run(model, tol=1e-9, integrator=None):
     settings = settle(model, None, None, integrator, tol)
     system = build(model)
     kept = Kept(system.scene.rows)
-    runner = Runner(system, settings, kept, None, print)
+    runner = Runner(system, settings, kept, SimpleNamespace(line=print), print)
     y, f = runner.method.y, runner.method.k[0]
     settle_contacts(system, runner.hooks, settings, y, f, False, print, print)
     runner.run(None, False)

@@ -100,15 +100,15 @@ def test_resume_in_the_second_part_is_bit_equal(tmp_path):
             runner["stopped"] = t
             raise KeyboardInterrupt
 
-    from mbsim.run import loop
+    from mbsim.run import divergence, loop
 
-    before = loop.RETURN_SECONDS, loop.FIRST_BUDGET
-    loop.RETURN_SECONDS, loop.FIRST_BUDGET = 1e-5, 5
+    before = divergence.RETURN_SECONDS, loop.FIRST_BUDGET
+    divergence.RETURN_SECONDS, loop.FIRST_BUDGET = 1e-5, 5
     try:
         with pytest.raises((KeyboardInterrupt, Interrupted)):
             mbsim.simulate(deck, output=tmp_path / "part", progress=stop)
     finally:
-        loop.RETURN_SECONDS, loop.FIRST_BUDGET = before
+        divergence.RETURN_SECONDS, loop.FIRST_BUDGET = before
     rest = mbsim.simulate(deck, output=tmp_path / "part", resume=True)
     assert runner["stopped"] < 2.0
     assert np.array_equal(whole["bodies/2/position"], rest["bodies/2/position"])

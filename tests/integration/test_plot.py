@@ -463,7 +463,7 @@ def test_only_pictures_are_replaced(files, here):
         (["energy/kinetic", "-o", "a.pdf"], 2, "must end in .png or .svg"),
         (["energy/kinetic", "-o", "no/a.png"], 5, "no/a.png: the picture cannot be written"),
         (["energy/kinetic", "--events", "--x", "energy/potential"], 2, "--events goes with"),
-        (["none.h5", "energy/kinetic"], 5, "none.h5: no such file"),
+        (["none.h5", "energy/kinetic"], 2, "none.h5: no such file"),
     ],
 )
 def test_what_is_wrong_is_one_line(files, here, arguments, code, said):

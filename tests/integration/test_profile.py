@@ -13,7 +13,7 @@ from mbsim.core.problem import Problem
 from mbsim.run import hook_profile
 
 #: Hooks that are no functions.
-NO_FUNCTION = {Hook.TANGENT}
+NO_FUNCTION = {Hook.TANGENT, Hook.STEPPING}
 
 
 def test_parts_add_up_to_the_time_of_the_run():

@@ -21,7 +21,7 @@ COUNTED = ("steps", "rejected", "rhs_evaluations", "jacobians", "factorizations"
 @pytest.fixture
 def impatient(monkeypatch):
     """Let runs come back to Python every few evaluations, and write all each time."""
-    monkeypatch.setattr(loop, "RETURN_SECONDS", 1e-6)
+    monkeypatch.setattr("mbsim.run.divergence.RETURN_SECONDS", 1e-6)
     monkeypatch.setattr(loop, "FIRST_BUDGET", 7)
 
 

@@ -44,7 +44,7 @@ STAGES = "".join(
 @pytest.fixture
 def busy(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let runs come back to Python every few evaluations, and publish each time."""
-    monkeypatch.setattr(loop, "RETURN_SECONDS", 1e-6)
+    monkeypatch.setattr("mbsim.run.divergence.RETURN_SECONDS", 1e-6)
     monkeypatch.setattr(loop, "FIRST_BUDGET", 7)
     monkeypatch.setattr(recorder.Recorder, "due", lambda self: True)
 

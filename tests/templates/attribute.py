@@ -13,8 +13,8 @@ LINES = {
         """    bending_reaction_arm: float = 0.0  # [L]
     preload_rate: float = 0.0  # [F/T]
 """,
-        "return radius, self.preload, self.bending_reaction_arm",
-        "return radius, self.preload, self.bending_reaction_arm, self.preload_rate",
+        "return radius, self.preload, *arms",
+        "return radius, self.preload, *arms, self.preload_rate",
     ),
     # what decks say, with meaning, unit and default for the manual's table
     "mbsim/forces/kinds/joint_friction.py": (
@@ -26,8 +26,8 @@ LINES = {
     ),
     # the formula
     "mbsim/dynamics/forces/joint_friction.py": (
-        "RADIUS, PRELOAD, ARM = range(3)",
-        "RADIUS, PRELOAD, ARM, PRELOAD_RATE = range(4)",
+        "RADIUS, PRELOAD, ARM, AXIAL_ARM, TWIST_ARM = range(5)",
+        "RADIUS, PRELOAD, ARM, AXIAL_ARM, TWIST_ARM, PRELOAD_RATE = range(6)",
         "    given[NFORCE_IN] = press(scene, f)\n",
         "    given[NFORCE_IN] = press(scene, f) + applied.par[f, PRELOAD_RATE] * t\n",
     ),

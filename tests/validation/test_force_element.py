@@ -426,7 +426,7 @@ def test_friction_about_an_axis_stops_a_spin(tmp_path):
 
 
 def test_a_run_goes_on_with_the_script_with_which_it_began(tmp_path, monkeypatch):
-    monkeypatch.setattr(loop, "RETURN_SECONDS", 1e-6)
+    monkeypatch.setattr("mbsim.run.divergence.RETURN_SECONDS", 1e-6)
     monkeypatch.setattr(loop, "FIRST_BUDGET", 7)
     script = tmp_path / "mine.py"
     script.write_text(DRY.read_text("utf-8"), encoding="utf-8")

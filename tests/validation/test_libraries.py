@@ -192,7 +192,7 @@ def test_a_run_goes_on_with_its_library(tmp_path, monkeypatch):
             raise Interrupted("enough")
 
     with monkeypatch.context() as often:
-        often.setattr("mbsim.run.loop.RETURN_SECONDS", 1e-5)
+        often.setattr("mbsim.run.divergence.RETURN_SECONDS", 1e-5)
         often.setattr("mbsim.run.loop.FIRST_BUDGET", 5)
         with pytest.raises(Interrupted):
             mbsim.simulate(model, plugins=[library], output=tmp_path / "out", progress=stop)

@@ -24,7 +24,6 @@ from mbsim.compile_model import build, contacts, pairing
 from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics
 from mbsim.dynamics.contact import broadphase as contact_set
 from mbsim.errors import Interrupted, ModelError, SolverError
-from mbsim.run import loop
 
 MOVING_PLANE = """<Body_Rigid id="9000" cg_id="90000" mass="1" inertia_xx="1" inertia_yy="1"
  inertia_zz="1"/><Reference_Marker id="90000" body_id="9000" pos_z="-1.4" a00="0.8" a20="-0.6"
@@ -263,7 +262,7 @@ def test_falling_apart_needs_no_narrowphase(tmp_path, all_by_broadphase):
 
 @pytest.mark.parametrize("method", ["DOPRI5", "VERLET"])
 def test_resume_of_a_set_is_bit_identical(tmp_path, all_by_broadphase, monkeypatch, method):
-    monkeypatch.setattr(loop, "RETURN_SECONDS", 1e-4)
+    monkeypatch.setattr("mbsim.run.divergence.RETURN_SECONDS", 1e-4)
     path = write_deck(tmp_path, pile(HEAP, v=VELOCITY, **LAW, **COULOMB) + GRAVITY, end_time=0.3)
     model = mbsim.read_model(path)
     settings = {"integrator": method, "tol": 1e-4}

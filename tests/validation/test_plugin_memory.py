@@ -14,7 +14,6 @@ from helpers.folders import USERFUNCS
 from mbsim.dynamics.pipeline import problem
 from mbsim.errors import Interrupted, ModelError, PluginError
 from mbsim.plugins import failure
-from mbsim.run import loop
 
 KEEPS = USERFUNCS / "stiction_with_state.py"
 STICTION = 'cff_type="STICTION" mu_static="0.4" mu_dynamic="0.4" tangential_stiffness="2e4"'
@@ -133,7 +132,7 @@ def test_stick_and_slip_that_take_turns_are_left_whatever_is_rejected(
 
 @pytest.mark.parametrize("friction", FRICTIONS)
 def test_a_resumed_run_is_the_same_to_the_last_bit(tmp_path, monkeypatch, friction):
-    monkeypatch.setattr(loop, "RETURN_SECONDS", 1e-4)
+    monkeypatch.setattr("mbsim.run.divergence.RETURN_SECONDS", 1e-4)
     model = pushed(tmp_path, FRICTIONS[friction])
     straight = mbsim.simulate(model, output=tmp_path / "a", integrator="DOPRI5")
 
