@@ -35,6 +35,7 @@ from mbsim.results.elements import acting
 from mbsim.results.files import prepare_directory
 from mbsim.results.forces import check_requests
 from mbsim.results.identity import Identity
+from mbsim.results.memory import MemoryStore
 from mbsim.results.reading import Results, open_results
 from mbsim.results.resume import MADE_OF, WRITTEN, check_same, digest
 from mbsim.results.signal_filter import SignalFilter
@@ -124,7 +125,9 @@ class Recorder:
         check_requests(system.model)
         if asked:
             self._asked.check(names_of(system))
-        self._settings: dict[str, Value] = {**attributes, **self._identity.digests}
+        # results in memory are not gone on from: nobody compares what they were made of
+        digests = self._identity.digests if directory is not None else {}
+        self._settings: dict[str, Value] = {**attributes, **digests}
         if directory is not None:
             prepare_directory(directory, system.model.name)
             self._target = directory / f"{system.model.name}.h5"
@@ -134,7 +137,7 @@ class Recorder:
         if resume:
             self.checkpoint = self._resumed()
         self._given = self._written[0]
-        self._store = Store(self._target, resume)
+        self._store = MemoryStore() if self._target is None else Store(self._target, resume)
         self._store.rows_at_once = self._block
         self._begin_file(resume)
 
