@@ -15,7 +15,16 @@ X, Y, TAG = range(3)
 
 
 @jitable
-def clip(polygon: F2, count: int, out: F2, nx: float, ny: float, limit: float, tag: float) -> int:
+def clip(
+    polygon: F2,
+    count: int,
+    out: F2,
+    nx: float,
+    ny: float,
+    limit: float,
+    tag: float,
+    tie: float = 0.0,
+) -> int:
     """Write the part of a polygon with nx x + ny y <= limit into `out`; return its vertices.
 
     Parameters
@@ -28,21 +37,23 @@ def clip(polygon: F2, count: int, out: F2, nx: float, ny: float, limit: float, t
         The half-plane.
     tag : float
         Of the edge that the half-plane's border becomes.
+    tie : float
+        A vertex that is outside by no more than that is on the border, and stays.
     """
     kept, capacity = 0, len(out)
     for k in range(count):
         after = k + 1 if k + 1 < count else 0
         here = nx * polygon[k, X] + ny * polygon[k, Y] - limit
         there = nx * polygon[after, X] + ny * polygon[after, Y] - limit
-        if here <= 0.0 and kept < capacity:
+        if here <= tie and kept < capacity:
             out[kept, X], out[kept, Y] = polygon[k, X], polygon[k, Y]
             out[kept, TAG] = polygon[k, TAG]
             kept += 1
-        if (here <= 0.0) != (there <= 0.0) and kept < capacity:
+        if (here <= tie) != (there <= tie) and kept < capacity:
             part = here / (here - there)
             out[kept, X] = polygon[k, X] + part * (polygon[after, X] - polygon[k, X])
             out[kept, Y] = polygon[k, Y] + part * (polygon[after, Y] - polygon[k, Y])
             # leaving, the border begins here; coming back, what is left of the edge does
-            out[kept, TAG] = tag if here <= 0.0 else polygon[k, TAG]
+            out[kept, TAG] = tag if here <= tie else polygon[k, TAG]
             kept += 1
     return kept

@@ -141,6 +141,24 @@ def of_elements(holder: Any, file: str) -> dict[str, Any]:
     return facts
 
 
+def _stamp(file: Path) -> tuple[int, ...]:
+    """Return what changes whenever a file does."""
+    found = file.stat()
+    return found.st_mtime_ns, found.st_ctime_ns, found.st_size, found.st_ino
+
+
+@functools.lru_cache(maxsize=1 << 10)
+def _words(file: Path, stamp: tuple[int, ...]) -> frozenset[str]:
+    """Return the names in a script; `stamp` is that of the file."""
+    return frozenset(re.findall(r"[^\W\d]\w*", file.read_text("utf-8", "replace")))
+
+
+@functools.lru_cache(maxsize=1 << 10)
+def _digest(file: Path, stamp: tuple[int, ...]) -> str:
+    """Return the digest of a file's bytes; `stamp` is that of the file."""
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
 def _files(file: Path) -> list[Path]:
     """Return a user's file and those beside it that it names: scripts import their neighbours."""
     found, waiting = {file}, [file]
@@ -148,8 +166,7 @@ def _files(file: Path) -> list[Path]:
         one = waiting.pop()
         if one.suffix not in (".py", ".m"):
             continue
-        text = one.read_text("utf-8", "replace")
-        for word in set(re.findall(r"[^\W\d]\w*", text)):
+        for word in _words(one, _stamp(one)):
             folder = one.parent / word
             near = folder.with_name(word + one.suffix)
             named = [near] if near.is_file() else []
@@ -174,7 +191,7 @@ def of_users(system: System) -> dict[str, Any]:
         source = Path(user.source)
         if source not in digests:
             digests[source] = {
-                str(file.relative_to(source.parent)): hashlib.sha256(file.read_bytes()).hexdigest()
+                str(file.relative_to(source.parent)): _digest(file, _stamp(file))
                 for file in _files(source)
             }
         facts[name] = digests[source] | {"compiled": getattr(user, "compiled", False)}

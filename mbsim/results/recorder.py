@@ -128,9 +128,7 @@ class Recorder:
         check_requests(system.model)
         if asked:
             self._asked.check(names_of(system))
-        # --resume compares digests
-        digests = self._identity.digests if directory is not None else {}
-        self._settings: dict[str, Value] = {**attributes, **digests}
+        self._settings: dict[str, Value] = {**attributes, **self._identity.digests}
         if directory is not None:
             prepare_directory(directory, system.model.name)
             self._target = directory / f"{system.model.name}.h5"

@@ -388,3 +388,33 @@ def test_beside_an_element_of_the_users_own_both_remember(tmp_path):
     slips = both["events"][both["events"]["kind"] == "slip"]
     assert len(slips) > 4
     assert np.ptp(both["force_elements/7/f"]) > 0.39
+
+
+@pytest.mark.parametrize("damping", [100, 1000])
+@pytest.mark.parametrize("method", ["RADAU5", "GALPHA"])
+def test_boxes_of_one_size_on_each_other_hold_a_push(method, damping, tmp_path):
+    # whose corners touch is not to be said by rounding: edges lie on each other
+    boxes, ids = "", []
+    for k in range(3):
+        marker = 20 + 10 * k
+        boxes += f"""
+<Body_Rigid id="{2 + k}" cg_id="{marker}" mass="1" inertia_xx="0.001667" inertia_yy="0.001667"
+  inertia_zz="0.001667"/><Reference_Marker id="{marker}" body_id="{2 + k}" pos_z="{0.05 + 0.1 * k}"/>
+<Post_Graphic id="{10 * marker}" type="BoxDefinedFromCenter" center_marker_id="{marker}"
+  length_x="0.1" length_y="0.1" length_z="0.1"/>"""
+        ids.append(str(10 * marker))
+    law = f"""cnf_type="IMPACT" stiffness="1e6" exponent="1" damping="{damping}" dmax="1e-5"
+  cff_type="STICTION" mu_static="0.5" mu_dynamic="0.4" tangential_stiffness="INFINITE" """
+    lists = f'num_i_graphics="3" i_graphics_id="{" ".join(ids)}"'
+    model = (
+        plane()
+        + boxes
+        + f'<Force_Contact id="301" {lists} {lists.replace("i_", "j_")} {law}/>'
+        + f'<Force_Contact id="302" {lists} num_j_graphics="1" j_graphics_id="100" {law}/>'
+        + push("STEP(TIME,0,0,0.5,10)")
+    )
+    results = run_deck(tmp_path, model, 1.0, 0.1, integrator=method)
+    # 10 N are 2.5e-6 m of four contacts of 1e6 N/m that the lowest box turns on
+    assert abs(results["bodies/2/position"][-1, :2]).max() < 1e-5
+    assert len(results["events"]) < 150
+    assert results.stats["steps"] < 3000

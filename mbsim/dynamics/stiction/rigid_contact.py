@@ -330,6 +330,7 @@ def record_sticking(scene: Scene, t: float) -> None:
         kept, before = state.memory[s], state.before[s]
         if state.touching[s] == 0:
             before[KEPT_MODE] = BEGUN
+            kept[KEPT_X] = rest(scene) + settled(scene)
             continue
         if before[KEPT_MODE] == BEGUN:
             # rows of the step in which it began show what holds from there on

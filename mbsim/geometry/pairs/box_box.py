@@ -54,6 +54,9 @@ BOX_BOX_SLOTS = 12
 FACES_FIRST = 1e-6
 #: Edges nearer to parallel than this (sine squared) give no axis of their own: the faces do.
 PARALLEL = 1e-16
+#: Corners of I that are outside of J's face by less than this part of its size are on it: where boxes
+#: of one size lie on each other rounding would say at every evaluation anew whose corners touch.
+TIE = 1e-10
 #: Vertices a scratch polygon holds: 8, and some for what rounding may add.
 CAPACITY = 12
 # scratch: R (9), t (3), the overlap along each axis (15)
@@ -278,10 +281,11 @@ def _manifold(
         polygon[k, Y] = y0 + sp * py + sq * qy
         polygon[k, TAG] = k
     # edges of I: 0 along p, 1 along q, 2 and 3 back; sides of J: 4 at x = A, 5 at y = B, 6, 7
-    count = clip(polygon, 4, other, 1.0, 0.0, A, 4.0)
-    count = clip(other, count, polygon, 0.0, 1.0, B, 5.0)
-    count = clip(polygon, count, other, -1.0, 0.0, A, 6.0)
-    count = clip(other, count, polygon, 0.0, -1.0, B, 7.0)
+    tie = TIE * (A + B)
+    count = clip(polygon, 4, other, 1.0, 0.0, A, 4.0, tie)
+    count = clip(other, count, polygon, 0.0, 1.0, B, 5.0, tie)
+    count = clip(polygon, count, other, -1.0, 0.0, A, 6.0, tie)
+    count = clip(other, count, polygon, 0.0, -1.0, B, 7.0, tie)
 
     # all along a, b and J's normal
     way, out_j, out_i = (na, nb, nn), (0.0, 0.0, 1.0), (ma, mb, mk)

@@ -115,7 +115,8 @@ def _dynamic_limit(inputs: FrictionInput, mu_dynamic: float) -> float:
     return mu_dynamic * inputs.nforce if math.isnan(inputs.limit) else inputs.limit
 
 
-#: What `rigid` keeps: mode, d, and the force that held, which is given where it is to be shown; in
+#: What `rigid` keeps: mode, d (before it touches, along x, a slip that is none to the tolerance), and
+#: the force that held, which is given where it is to be shown; in
 #: place of that force, while it slips, the speed at the committed state, and that at which it was
 #: let go: what sticks moves as its neighbours let it, that is by how they turn over its depth.
 KEPT_MODE, KEPT_X, KEPT_Y, STICKING_X, STICKING_Y = range(5)
@@ -146,7 +147,8 @@ def rigid(
     limit = _dynamic_limit(inputs, mu_dynamic)
     ux, uy = inputs.xdot[0], inputs.xdot[1]
     if mode == BEGUN:
-        size = math.hypot(ux, uy)
+        # beside what sticks slip is rounding, whose way is none
+        size = math.hypot(ux, uy) + dx
         part = limit / size if size > 0.0 else 0.0
         return (-part * ux, -part * uy, 0.0, 0.0, 0.0, 0.0, mode, mode, 1.0, 0.0), memory
     rest = math.hypot(dx, dy)
