@@ -51,7 +51,7 @@ def region_address(name: str) -> int:
 
     made, slots = REGIONS[name], PAIRS[name].slots + REGION_ROWS
     adapted = pair_adapter.adapt_region(made.points, made.whole, slots)
-    return jit.address(adapted, pair_adapter.SIGNATURE)
+    return jit.address(adapted, pair_adapter.SIGNATURE, allocates=True)
 
 
 def kernel_address(kind: Kind) -> int:
@@ -69,7 +69,7 @@ def pair_address(pair: Pair) -> int:
     from mbsim.compile_model import pair_adapter
 
     adapted = pair_adapter.adapt_pair(pair.points, pair.slots)
-    return jit.address(adapted, pair_adapter.SIGNATURE)
+    return jit.address(adapted, pair_adapter.SIGNATURE, allocates=True)
 
 
 def graphics_table(

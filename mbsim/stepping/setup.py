@@ -97,7 +97,7 @@ def _plan(system: System, fixed: bool, tol: float) -> Plan:
         near[k] = kind.closed_form in APART or kind.closed_form in NEARS
         if kind.closed_form in NEARS:
             adapted = adapt_pair(NEARS[kind.closed_form], int(rows[k]))
-            scene.kinds.kernel[k] = jit.address(adapted, SIGNATURE)
+            scene.kinds.kernel[k] = jit.address(adapted, SIGNATURE, allocates=True)
         elif kind.region:
             scene.kinds.kernel[k] = pair_address(PAIRS[kind.closed_form])
     number = np.zeros(PLAN_NUMBERS)

@@ -50,4 +50,4 @@ def residual_address(
     """Return the address of a rewritten residual behind FRICTION_SIGNATURE."""
     for each in (*callees, function):
         register_jitable(error_model="python", boundscheck=True)(each)
-    return jit.address(_adapt(function, count, axes, unknowns), FRICTION_SIGNATURE)
+    return jit.address(_adapt(function, count, axes, unknowns), FRICTION_SIGNATURE, allocates=True)
