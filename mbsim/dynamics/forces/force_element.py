@@ -87,7 +87,7 @@ def fill_motion(scene: Scene, t: float, y: F1, e: int) -> None:
 @jitable
 def step_of(scene: Scene, t: float, memory: F1) -> float:
     """Return the time since the state that is remembered."""
-    h = t - memory[0]
+    h = t - memory[AT_TIME]
     return h if h > 0.0 else 0.0
 
 
@@ -106,7 +106,7 @@ def find_unknowns(scene: Scene, t: float, y: F1, e: int) -> int:
     """Find the unknowns of element e at a point and leave them in `given`; return a code."""
     R, na, nu = scene.residuals, axes_of(scene, e), unknowns_of(scene, e)
     memory = scene.state.residual[e, remembered(scene)]
-    known = math.isfinite(memory[0])
+    known = math.isfinite(memory[AT_TIME])
     h = step_of(scene, t, memory)
     fill_motion(scene, t, y, e)
     if known and switches(scene, e):
