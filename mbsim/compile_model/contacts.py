@@ -25,7 +25,7 @@ from mbsim.compile_model.pairing import (
 from mbsim.compile_model.surfaces import Need, needed_as_triangles, packed_surfaces, thickness
 from mbsim.core import jit
 from mbsim.core.layout import BODY_SIZE
-from mbsim.geometry.catalog import PAIRS, REGION_ROWS, REGIONS, SIZE, Pair
+from mbsim.geometry.catalog import NEARS, PAIRS, REGION_ROWS, REGIONS, SIZE, Pair
 from mbsim.laws import abi
 from mbsim.laws.catalog import NORMAL_LAWS, friction_law_of
 from mbsim.model.contact_radius import with_radii
@@ -51,7 +51,7 @@ def region_address(name: str) -> int:
 
     made, slots = REGIONS[name], PAIRS[name].slots + REGION_ROWS
     adapted = pair_adapter.adapt_region(made.points, made.whole, slots)
-    return jit.address(adapted, pair_adapter.SIGNATURE)
+    return jit.address(adapted, pair_adapter.SIGNATURE, allocates=True)
 
 
 def kernel_address(kind: Kind) -> int:
@@ -69,7 +69,16 @@ def pair_address(pair: Pair) -> int:
     from mbsim.compile_model import pair_adapter
 
     adapted = pair_adapter.adapt_pair(pair.points, pair.slots)
-    return jit.address(adapted, pair_adapter.SIGNATURE)
+    return jit.address(adapted, pair_adapter.SIGNATURE, allocates=True)
+
+
+@functools.cache
+def near_address(name: str, rows: int) -> int:
+    """Return the address of what gives the points of a pair that is apart too, in `rows` rows."""
+    from mbsim.compile_model import pair_adapter
+
+    adapted = pair_adapter.adapt_pair(NEARS[name], rows)
+    return jit.address(adapted, pair_adapter.SIGNATURE, allocates=True)
 
 
 def graphics_table(

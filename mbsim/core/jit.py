@@ -139,14 +139,16 @@ def planned(make: Callable[[], Made]) -> Made:
 
 
 @functools.cache
-def function(py_func: Callable[..., Any]) -> Callable[..., Any]:
+def function(py_func: Callable[..., Any], allocates: bool = True) -> Callable[..., Any]:
     """Return `py_func` compiled at its first call (or loaded from the cache), once a process.
 
     It runs without Python's lock, so that another thread may write meanwhile. What stands elsewhere
-    is not cached: Numba would keep it while the arrays that it looks at change.
+    is not cached: Numba would keep it while the arrays that it looks at change. What `allocates` no
+    arrays need not count who uses which: that costs a call for each that is passed on.
     """
     linking.install_library()
-    made: Any = numba.njit(error_model="numpy", nogil=True)(py_func)
+    options: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": allocates}
+    made: Any = numba.njit(**options)(py_func)
     if is_known(py_func):
         made._cache = CodeCache(py_func, _about_to_compile)
     else:
@@ -154,9 +156,9 @@ def function(py_func: Callable[..., Any]) -> Callable[..., Any]:
     return cast(Callable[..., Any], made)
 
 
-def awaited(py_func: Callable[..., Any]) -> Callable[..., Any]:
+def awaited(py_func: Callable[..., Any], allocates: bool = True) -> Callable[..., Any]:
     """Return `function(py_func)`, counted (`planned`) as what is called soon."""
-    made: Any = function(py_func)
+    made: Any = function(py_func, allocates)
     if _missing is not None and isinstance(made._cache, CodeCache):
         if not made.overloads and made._cache.is_empty():
             _missing.append(py_func.__qualname__)
@@ -166,17 +168,18 @@ def awaited(py_func: Callable[..., Any]) -> Callable[..., Any]:
 _kept: dict[Any, Any] = {}
 
 
-def address(py_func: Callable[..., Any], signature: Any) -> int:
+def address(py_func: Callable[..., Any], signature: Any, allocates: bool = False) -> int:
     """Return the address of `py_func` compiled as a C function; it lives as long as the process.
 
-    As with `function`, what stands elsewhere is not cached.
+    As with `function`, what stands elsewhere is not cached, and only what `allocates` may make
+    arrays, as users' functions may.
     """
     key = py_func, signature
     if key in _kept:
         return int(_kept[key].address)
     linking.install_library()
     typed = sigutils.normalize_signature(signature)
-    made: Any = CFunc(py_func, typed, {}, {"error_model": "numpy"})
+    made: Any = CFunc(py_func, typed, {}, {"error_model": "numpy", "_nrt": allocates})
     if is_known(py_func):
         made._cache = CodeCache(py_func, _about_to_compile)
     else:

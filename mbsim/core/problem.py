@@ -107,6 +107,8 @@ HOOK = types.int64(types.int64, types.float64, types.float64, _PTR, _PTR)
 MEASURE = types.float64(types.int64, types.float64, types.float64, _PTR, _PTR)
 #: The hooks that measure.
 MEASURES = frozenset({"norm", "check", "inner", "limit", "stable"})
+#: The hooks that make arrays as long as what they find.
+ALLOCATING = frozenset({"step"})
 
 
 class Problem(NamedTuple):
@@ -142,7 +144,7 @@ def addresses(hooks: Mapping[str, Callable[..., Any]]) -> dict[str, int]:
     from mbsim.core import jit
 
     return {
-        name: jit.address(hook, MEASURE if name in MEASURES else HOOK)
+        name: jit.address(hook, MEASURE if name in MEASURES else HOOK, name in ALLOCATING)
         for name, hook in hooks.items()
     }
 

@@ -28,8 +28,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
@@ -65,6 +63,7 @@ from mbsim.integrators.scheme import (
     TOL,
     Method,
     Scheme,
+    factor_real,
     in_workspace,
     project,
 )
@@ -140,8 +139,7 @@ def probe(p: Problem, m: Method, t: float, h: float) -> int:
     m.memory[FACTORED_STEP] = 0.0
     m.counts[FACTORIZATIONS] += 1
     g = 1.0 / s
-    c = np.array((g, g * g, g, 0.0))
-    code = call_int(p.factor, (p.context, t, h, c, c))
+    code = factor_real(p, m, t, h, (g, g * g, g), 0.0)
     if code != 0:
         return unless_singular(code)
     for i in range(n):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
@@ -37,6 +35,7 @@ from mbsim.integrators.scheme import (
     RETRY,
     TOL,
     Method,
+    factor_real,
     project,
 )
 
@@ -246,8 +245,8 @@ def factor(p: Problem, m: Method, t: float, h: float) -> int:
     """Factor the system of a step of length h; return a code."""
     m.counts[FACTORIZATIONS] += 1
     part = (1.0 - AM) / (1.0 - AF)
-    c = np.array((GAMMA / (BETA * h), part / (BETA * h * h), part / (GAMMA * h), 1.0))
-    code = call_int(p.factor, (p.context, t, h, c, c))
+    c = GAMMA / (BETA * h), part / (BETA * h * h), part / (GAMMA * h)
+    code = factor_real(p, m, t, h, c, 1.0)
     m.memory[FACTORED_STEP] = h if code == 0 else 0.0
     return code
 

@@ -59,6 +59,7 @@ from mbsim.integrators.scheme import (
     WHERE,
     Method,
     Scheme,
+    factor_real,
     in_workspace,
     note_failure,
     project,
@@ -127,11 +128,12 @@ def factor(p: Problem, m: Method, t: float, h: float) -> int:
     m.counts[FACTORIZATIONS] += 1
     m.memory[FACTORED_STEP] = 0.0
     g, re, im = G0 / h, G_RE / h, G_IM / h
-    c = np.array((g, g * g, g, 0.0))
-    code = call_int(p.factor, (p.context, t, h, c, c))
+    code = factor_real(p, m, t, h, (g, g * g, g), 0.0)
     if code != 0:
         return code
-    pair = np.array((re, im, re * re - im * im, 2.0 * re * im, re, im, 0.0))
+    pair = m.coefficients
+    pair[0], pair[1], pair[2], pair[3] = re, im, re * re - im * im, 2.0 * re * im
+    pair[4], pair[5], pair[6] = re, im, 0.0
     code = call_int(p.factor_pair, (p.context, t, h, pair, pair))
     if code == 0:
         m.memory[FACTORED_STEP] = h

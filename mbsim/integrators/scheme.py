@@ -36,7 +36,7 @@ import numpy as np
 
 from mbsim.core import tags
 from mbsim.core.address import call_int, view
-from mbsim.core.arrays import F1, F2, I1
+from mbsim.core.arrays import F1, F2, I1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import STATE, Problem
 
@@ -100,6 +100,8 @@ MEMORY = 59
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
 JACOBIANS, FACTORIZATIONS, NEXT_WATCH, ROW = range(7, 11)
 COUNTS = 11
+# numbers that `factor_pair` takes, which are more than those of `factor`
+COEFFICIENTS = 7
 #: What is left unsolved of a step's equations may be this part of its error, or less.
 LEFT = 0.03
 
@@ -136,6 +138,8 @@ class Method(NamedTuple):
     kept: F2  # (carried, n) what the method needs of the step before
     ahead: tags.Scratch[F2]  # (carried, n) the same of the step that was tried last
     timetable: F2  # (rows, 2) where each row ends, how far a step may go from it; see `driver`
+    # (7,) of the systems that an implicit step solves, as `factor` and `factor_pair` take them
+    coefficients: tags.Scratch[F1]
 
 
 @tags.constant
@@ -191,6 +195,7 @@ def make(scheme: Scheme, y0: Any, t0: float, kinds: Any = None, rows: int = 1) -
         np.zeros((scheme.carried, n)),
         np.zeros((scheme.carried, n)),
         np.full((rows, 2), math.inf),
+        np.zeros(COEFFICIENTS),
     )
 
 
@@ -201,6 +206,14 @@ def both(one: Scheme, other: Scheme) -> Scheme:
         dense=max(one.dense, other.dense),
         carried=max(one.carried, other.carried),
     )
+
+
+@jitable
+def factor_real(p: Problem, m: Method, t: float, h: float, c: V3, form: float) -> int:
+    """Let the problem factor its real system with coefficients `c`; return its code."""
+    given = m.coefficients
+    given[0], given[1], given[2], given[3] = c[0], c[1], c[2], form
+    return call_int(p.factor, (p.context, t, h, given, given))
 
 
 @jitable

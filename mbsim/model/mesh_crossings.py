@@ -35,8 +35,12 @@ def crossings(vertices: Array, faces: Faces) -> tuple[Indices, Array]:
     """
     points = vertices[faces]
     touch = _TOUCH * float(np.ptp(points.reshape(-1, 3), axis=0).max())
+    normals = _unit_normals(points)
     pairs, places = [], []
     for i, j in near_pairs(points):
+        # most near pairs lie in one plane, or one beside the other's
+        may = _cuts_plane(points, normals, i, j, touch) | _cuts_plane(points, normals, j, i, touch)
+        i, j = i[may], j[may]
         shared = (faces[i][:, :, None] == faces[j][:, None, :]).any(axis=2).sum(axis=1)
         i, j = i[shared < 2], j[shared < 2]
         hit = np.zeros(len(i), dtype=bool)
@@ -44,7 +48,7 @@ def crossings(vertices: Array, faces: Faces) -> tuple[Indices, Array]:
         for a, b in ((i, j), (j, i)):
             for k in range(3):
                 p, q = points[a, k], points[a, (k + 1) % 3]
-                through, at = _through(p, q, points[b], touch)
+                through, at = _through(p, q, points[b], normals[b], touch)
                 place[through & ~hit] = at[through & ~hit]
                 hit |= through
         pairs.append(np.column_stack([i, j])[hit])
@@ -54,14 +58,33 @@ def crossings(vertices: Array, faces: Faces) -> tuple[Indices, Array]:
     return np.concatenate(pairs), np.concatenate(places)
 
 
+def _unit_normals(points: Array) -> Array:
+    """Return the unit normals (m, 3) of triangles (m, 3, 3), 0 of those without area."""
+    normal = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+    area = np.linalg.norm(normal, axis=1)
+    found: Array = normal / np.where(area > 0.0, area, 1.0)[:, None]
+    return found
+
+
+def _cuts_plane(
+    points: Array, normals: Array, i: Indices, j: Indices, touch: float
+) -> npt.NDArray[np.bool_]:
+    """Return which triangles i (n,) have corners on both sides of the planes of triangles j."""
+    beyond, behind = np.zeros(len(i), dtype=bool), np.zeros(len(i), dtype=bool)
+    start, normal = points[j, 0], normals[j]
+    for k in range(3):
+        above = ((points[i, k] - start) * normal).sum(axis=1)
+        beyond |= above > touch
+        behind |= above < -touch
+    found: npt.NDArray[np.bool_] = beyond & behind
+    return found
+
+
 def _through(
-    p: Array, q: Array, triangle: Array, touch: float
+    p: Array, q: Array, triangle: Array, normal: Array, touch: float
 ) -> tuple[npt.NDArray[np.bool_], Array]:
     """Return which segments p q (n, 3) go through triangles (n, 3, 3), and where."""
     a, b, c = triangle[:, 0], triangle[:, 1], triangle[:, 2]
-    normal = np.cross(b - a, c - a)
-    area = np.linalg.norm(normal, axis=1)
-    normal = normal / np.where(area > 0.0, area, 1.0)[:, None]
     above, below = ((p - a) * normal).sum(axis=1), ((q - a) * normal).sum(axis=1)
     # a segment with an end on the plane touches
     through = (above * below < 0.0) & (np.minimum(abs(above), abs(below)) > touch)

@@ -62,7 +62,7 @@ class Runner:
         timed = follows_time(system.scene)
         self._advance, self.methods = jit.planned(
             lambda: (
-                jit.awaited(driver.advance),
+                jit.awaited(driver.advance, allocates=False),
                 Methods(system, settings.integrator, start, timed, settings.fixed, settings.tol),
             )
         )

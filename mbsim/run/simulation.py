@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from os import PathLike
 from pathlib import Path
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from mbsim.compile_model.build import System
     from mbsim.compile_model.changes import Parameters
     from mbsim.results.audit import Audit
+    from mbsim.results.log import RunLog
     from mbsim.results.reading import Results
 
 
@@ -284,12 +285,7 @@ def _run(model: Model, options: Options) -> Results:
         recorder.abandon()
         raise
     log = RunLog(system, attributes, recorder.directory, options.resume)
-    for note in (*said, *settings.notes, *_advice(model, settings)):
-        log.line(note)
-    if system.user_laws or system.subroutines or system.posts:
-        from mbsim.plugins import host
-
-        host.log = log.line
+    begin_log(log, system, (*said, *settings.notes, *_advice(model, settings)))
     status = "failed"
     with part("build"):
         runner = Runner(system, settings, recorder, log, tell, changes)
@@ -324,6 +320,24 @@ def _run(model: Model, options: Options) -> Results:
             results = _finish(runner, status, time.perf_counter() - began, compiled)
     assert results is not None  # a finished run has rows
     return results
+
+
+def begin_log(log: RunLog, system: System, notes: Iterable[str]) -> None:
+    """Write what is said before the run, and let users' code write there."""
+    for note in notes:
+        log.line(note)
+    if system.user_laws or system.subroutines or system.posts:
+        from mbsim.plugins import host
+
+        host.log = log.line
+
+
+def end_users(system: System) -> None:
+    """Let interpreters that were started for the run end."""
+    if any(user.language == "Octave" for _, user in system.user_laws):
+        from mbsim.plugins.subroutine import end_run
+
+        end_run()
 
 
 def _advice(model: Model, settings: Settings) -> list[str]:
@@ -371,10 +385,7 @@ def _finish(runner: Runner, status: str, wall: float, compiled: float) -> Result
                 close_log()
         raise
     finally:
-        if any(user.language == "Octave" for _, user in system.user_laws):
-            from mbsim.plugins.subroutine import end_run
-
-            end_run()
+        end_users(system)
 
 
 def _announce(system: System, settings: Settings, said: list[str], tell: Notify) -> list[str]:

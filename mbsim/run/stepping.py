@@ -21,6 +21,7 @@ from mbsim.run.loop import FIRST_BUDGET, Runner
 from mbsim.run.options import Notify
 from mbsim.run.settings import Settings, settle
 from mbsim.run.signals_now import SignalsNow
+from mbsim.run.simulation import begin_log, end_users, prepare
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
@@ -197,10 +198,7 @@ class Stepper(Runner):
         self._closed = True
         self._history.take()
         self._history.end()
-        if any(user.language == "Octave" for _, user in self.system.user_laws):
-            from mbsim.plugins.subroutine import end_run
-
-            end_run()
+        end_users(self.system)
 
     def __enter__(self) -> Stepper:
         return self
@@ -373,7 +371,6 @@ def open_model(
     """
     from mbsim.reader.xml import as_model
     from mbsim.results.log import RunLog
-    from mbsim.run.simulation import prepare
 
     tell = notify or (lambda line: None)
     given, names = with_inputs(as_model(model, overrides), inputs)
@@ -381,12 +378,7 @@ def open_model(
     files = [Path(file) for file in plugins]
     made = prepare(given, settings, files, detector, interpret_plugins, scripts, tell)
     log = RunLog(made.system, made.attributes, None)
-    for note in (*made.said, *settings.notes):
-        log.line(note)
-    if made.system.user_laws or made.system.subroutines or made.system.posts:
-        from mbsim.plugins import host
-
-        host.log = log.line
+    begin_log(log, made.system, (*made.said, *settings.notes))
     history = History(made.system, made.attributes, settings)
     stepper = Stepper(made.system, settings, history, log, tell, made.changes, names)
     stepper.begin(allow_overlap)

@@ -87,8 +87,7 @@ class Made(NamedTuple):
 
 def _plan(system: System, fixed: bool, tol: float) -> Plan:
     """Return what holds for the run, and let pairs be measured where they are apart too."""
-    from mbsim.compile_model.contacts import pair_address
-    from mbsim.compile_model.pair_adapter import SIGNATURE, adapt_pair
+    from mbsim.compile_model.contacts import near_address, pair_address
 
     kinds, scene = system.plans.kinds, system.scene
     near, rows = (np.zeros(len(kinds), dtype=np.int64) for _ in range(2))
@@ -96,8 +95,7 @@ def _plan(system: System, fixed: bool, tol: float) -> Plan:
         rows[k] = kind.slots - (REGION_ROWS if kind.region else 0)
         near[k] = kind.closed_form in APART or kind.closed_form in NEARS
         if kind.closed_form in NEARS:
-            adapted = adapt_pair(NEARS[kind.closed_form], int(rows[k]))
-            scene.kinds.kernel[k] = jit.address(adapted, SIGNATURE)
+            scene.kinds.kernel[k] = near_address(kind.closed_form, int(rows[k]))
         elif kind.region:
             scene.kinds.kernel[k] = pair_address(PAIRS[kind.closed_form])
     number = np.zeros(PLAN_NUMBERS)

@@ -27,6 +27,8 @@ window.mbsimReady = mbsim.start(document.getElementById("view")).then(function (
   return view;
 });
 """
+#: A page that is the view alone.
+_WHOLE = "html, body { margin: 0; height: 100%; overflow: hidden; }\n"
 
 
 def static(name: str) -> str:
@@ -71,6 +73,21 @@ def pack_elements(packs: Sequence[RunData]) -> str:
     )
 
 
+def document(title: str, body: str, style: str, script: str, connect: str = "'none'") -> str:
+    """Return a page that needs nothing else: its body, opened, and what it is shown and run by.
+
+    `title` is escaped here; `script` follows ours; `connect` as in `page`.
+    """
+    return static("page.html").format(
+        title=escape(title),
+        connect=connect,
+        style=style,
+        body=body.rstrip(),
+        library=library(),
+        script=scripts() + script,
+    )
+
+
 def page(
     title: str, settings: Mapping[str, Any], packs: Sequence[RunData] = (), connect: str = "'none'"
 ) -> str:
@@ -87,16 +104,12 @@ def page(
     connect : str
         From where the page may ask for more, as its security policy has it.
     """
-    return static("view.html").format(
-        title=escape(title),
-        connect=connect,
-        style=static("view.css"),
+    body = static("view.html").format(
         settings=escape(json.dumps(settings)),
         body=static("body.html"),
         packs=pack_elements(packs),
-        library=library(),
-        script=scripts() + _MOUNT,
     )
+    return document(title, body, _WHOLE + static("view.css"), _MOUNT, connect)
 
 
 def title_of(scenes: Sequence[Scene]) -> str:

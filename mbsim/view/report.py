@@ -12,7 +12,7 @@ from mbsim.model.elements import Model
 from mbsim.model.subroutines import wanted
 from mbsim.results.reading import Results
 from mbsim.view import report_parts as parts
-from mbsim.view.page import library, pack_elements, packs_of, scripts, static
+from mbsim.view.page import document, pack_elements, packs_of, static
 from mbsim.view.scene import read_scene
 
 #: Longest text of a deck or script that a report quotes [characters].
@@ -40,10 +40,8 @@ def report(results: Results) -> str:
         ("Counters", parts.counters(results)),
         ("Deck and user files", _texts(results, model)),
     ]
-    return static("report.html").format(
-        title=escape(f"{name}: report"),
+    body = static("report.html").format(
         name=escape(name),
-        style=static("view.css") + static("report.css"),
         contents="".join(
             f'<a href="#{_anchor(title)}">{escape(title)}</a>' for title, text in sections if text
         ),
@@ -52,9 +50,9 @@ def report(results: Results) -> str:
             for title, text in sections
             if text
         ),
-        library=library(),
-        script=scripts() + static("report.js"),
     )
+    style = static("view.css") + static("report.css")
+    return document(f"{name}: report", body, style, static("report.js"))
 
 
 def _anchor(title: str) -> str:

@@ -93,13 +93,16 @@ def _laws() -> Iterator[Task]:
 
 def _pairs() -> Iterator[Task]:
     """Yield the pairs of shapes that have closed forms."""
-    from mbsim.compile_model.contacts import pair_address, region_address
-    from mbsim.geometry.catalog import PAIRS, REGIONS
+    from mbsim.compile_model.contacts import near_address, pair_address, region_address
+    from mbsim.geometry.catalog import NEARS, PAIRS, REGIONS
 
     for name in PAIRS:
         yield Task(name, functools.partial(pair_address, PAIRS[name]))
     for name in REGIONS:
         yield Task(f"{name} region", functools.partial(region_address, name))
+    for name in NEARS:
+        rows = PAIRS[name].slots
+        yield Task(f"{name} apart", functools.partial(near_address, name, rows))
 
 
 def _runs(files: Sequence[str] | Iterator[str], methods: Sequence[str]) -> Iterator[Task]:

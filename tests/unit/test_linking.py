@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import functools
 import math
 import os
@@ -21,6 +22,7 @@ from numba.core.types import Array, Tuple
 from helpers.folders import MODELS, PACKAGES
 from mbsim.core import jit, linking, numba_costs
 from mbsim.core.jitable import jitable
+from mbsim.core.memory import floats_at
 
 pytestmark = pytest.mark.skipif(linking.POLICY == "all", reason="Numba's own linking")
 
@@ -473,6 +475,36 @@ def test_a_location_is_taken_by_who_names_it():
         assert numba_costs._takes_location(function) == numba_costs._has_location(function)
 
 
+@jitable
+def _largest(values):
+    found = values[0]
+    for value in values[1:]:
+        found = max(found, value)
+    return found
+
+
+def test_who_uses_an_array_is_counted_only_where_some_are_made():
+    values = np.array([1.0, 3.0, 2.0])
+
+    def passes_on(address, count):
+        return _largest(floats_at(address, count))
+
+    def makes(address, count):
+        return _largest(floats_at(address, count) + np.zeros(count))
+
+    signature = float64(int64, int64)
+    for function, allocates in ((passes_on, False), (passes_on, True), (makes, True)):
+        jit._kept.pop((function, signature), None)
+        found = jit.address(function, signature, allocates)
+        kept = str(jit._kept[function, signature]._library._final_module)
+        assert ("NRT_incref" in kept or "NRT_decref" in kept) == (function is makes or allocates)
+        called = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_int64, ctypes.c_int64)(found)
+        assert called(values.ctypes.data, 3) == 3.0
+    del jit._kept[makes, signature]
+    with pytest.raises(TypingError):
+        jit.address(makes, signature)
+
+
 COMPILED = """
 import sys
 import mbsim
@@ -504,7 +536,7 @@ BRANCHES = "mbsim.integrators.branches mbsim.integrators.events mbsim.dynamics.e
 #: form, flat faces that are one incident.
 OF_SOME_CONTACTS = (
     "contact.fixed_step contact.fcl_points add_region_stiffness add_moves_of_centre "
-    "contact.tilting "
+    "contact.tilting contact.spreading points.keep_slots points.exchange "
 )
 #: Of joints, forces, expressions; of friction with memory, and faces that are one incident.
 MECHANISMS = (

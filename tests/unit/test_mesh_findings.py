@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from click.testing import CliRunner
 from helpers.minimal_deck import added, deck
 from mbsim.cli.main import main
 from mbsim.errors import ModelError
+from mbsim.model import mesh_crossings
 from mbsim.model.mass_properties import polyhedron
 from mbsim.model.mesh import merge_vertices, solid_fault, winding_number
 from mbsim.model.mesh_crossings import crossings, near_pairs
@@ -240,6 +242,26 @@ def test_crossings_of_two_balls_are_those_that_fcl_sees(shift: tuple[float, floa
 @pytest.mark.parametrize("mesh", [BALL, TORUS, BOX, with_t_joint(BOX)])
 def test_a_mesh_that_only_touches_itself_has_no_crossings(mesh: Mesh) -> None:
     assert crossing_findings(*mesh) == []
+
+
+def test_few_near_triangles_are_looked_at_closely(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fans of a gear's sides: triangles of one plane, whose boxes overlap by the thousand."""
+    flat = of(trimesh.creation.cylinder(radius=1.0, height=0.2, sections=200))
+    tried = []
+    whole = mesh_crossings._through
+
+    def counted(*given: Any) -> Any:
+        tried.append(len(given[0]))
+        return whole(*given)
+
+    monkeypatch.setattr(mesh_crossings, "_through", counted)
+    assert len(crossings(*flat)[0]) == 0
+    near = sum(len(i) for i, _ in near_pairs(flat[0][flat[1]]))
+    assert sum(tried) < 0.1 * near
+    tried.clear()
+    shifted = (flat[0] + (0.7, 0.1, 0.05), flat[1])
+    assert len(crossings(*two(shifted))[0]) > 0
+    assert sum(tried) > 0
 
 
 def meshed(folder: Path, mesh: Mesh, name: str = "part.off") -> Path:

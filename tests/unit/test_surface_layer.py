@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import trimesh
 
+from helpers.folders import data_file
 from mbsim.model.mesh_file import load_mesh
 from mbsim.model.surface_layer import inner_directions, layer, tetrahedra, volumes
-from tests.helpers.folders import data_file
 
 Mesh = tuple[Any, Any]
 

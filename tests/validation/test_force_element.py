@@ -16,6 +16,7 @@ from helpers.decks import run_deck, run_in_pieces, write_deck
 from helpers.folders import USERFUNCS
 from helpers.reference import jenkins_block
 from mbsim.errors import DeckError, Interrupted, ModelError, PluginError, SolverError
+from mbsim.plugins.residual import load_residual
 from mbsim.run import loop
 
 DRY = USERFUNCS / "dry_friction_element.py"
@@ -247,6 +248,8 @@ def test_compiled_and_interpreted_are_the_same(tmp_path, script):
     for name, par, file in (("dry_friction", "1, 0.02", DRY), ("maxwell", "20, 3", script)):
         model = GROUND + body(2, 1.0, v=1.0) + spring(4.0) + element(name, par, file)
         deck = mbsim.read_model(write_deck(tmp_path, model, 2.0, 0.05))
+        (given,) = deck.force_elements.values()
+        assert load_residual(given).compiled
         compiled = mbsim.simulate(deck, integrator="DOPRI5")
         interpreted = mbsim.simulate(deck, integrator="DOPRI5", interpret_plugins=True)
         for path in ("bodies/2/position", "force_elements/7/f"):
@@ -497,8 +500,6 @@ def test_a_force_that_jumps_with_the_rate_is_refused(tmp_path, line):
 )
 @pytest.mark.parametrize("values", ["0.1,3", "2e4,1e-6", "1e-3,1"])
 def test_branches_and_steep_residuals_are_taken(tmp_path, line, values):
-    from mbsim.plugins.residual import load_residual
-
     (tmp_path / "modes.py").write_text(MODES.format(body=line))
     model = GROUND + body(2, 1.0, v=1.0) + element("law", values, "modes.py")
     deck = mbsim.read_model(write_deck(tmp_path, model))

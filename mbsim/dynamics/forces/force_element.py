@@ -50,9 +50,9 @@ SHORT, SHORTEST = 1e-8, 1e-14
 
 
 @jitable
-def memory_of(scene: Scene, e: int) -> F1:
-    """Return what element e remembers for the point being evaluated: time, x, f, f'."""
-    return scene.state.residual[e, BEFORE if scene.world.past[0] == 1 else NOW]
+def remembered(scene: Scene) -> int:
+    """Return where elements remember time, x, f, f' for the point being evaluated."""
+    return BEFORE if scene.world.past[0] == 1 else NOW
 
 
 @jitable
@@ -87,7 +87,7 @@ def fill_motion(scene: Scene, t: float, y: F1, e: int) -> None:
 @jitable
 def step_of(scene: Scene, t: float, memory: F1) -> float:
     """Return the time since the state that is remembered."""
-    h = t - memory[0]
+    h = t - memory[AT_TIME]
     return h if h > 0.0 else 0.0
 
 
@@ -105,8 +105,8 @@ def mean_rates(scene: Scene, e: int, h: float, memory: F1) -> None:
 def find_unknowns(scene: Scene, t: float, y: F1, e: int) -> int:
     """Find the unknowns of element e at a point and leave them in `given`; return a code."""
     R, na, nu = scene.residuals, axes_of(scene, e), unknowns_of(scene, e)
-    memory = memory_of(scene, e)
-    known = math.isfinite(memory[0])
+    memory = scene.state.residual[e, remembered(scene)]
+    known = math.isfinite(memory[AT_TIME])
     h = step_of(scene, t, memory)
     fill_motion(scene, t, y, e)
     if known and switches(scene, e):

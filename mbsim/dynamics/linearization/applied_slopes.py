@@ -32,6 +32,7 @@ from mbsim.dynamics.linearization.stiffness import (
     PART,
     PART_OF_SPEED,
     PUSH,
+    UNIT_ROW,
     add_axis_rate,
     add_geometry,
     add_rate_by_pose,
@@ -96,7 +97,8 @@ def add_vector_slopes(scene: Scene, T: Tangent, t: float, y: F1, f: int) -> None
         if program < 0:
             continue
         e = marker_axis(scene, scene.applied.axes[f], k % 3)
-        u = fill_unit(scene, T, y, f, e if k < 3 else none, none if k < 3 else e, 0)
+        fill_unit(scene, T, y, f, e if k < 3 else none, none if k < 3 else e, 0)
+        u = T.linear.basis[:, UNIT_ROW]
         add_program_slopes(scene, T, t, y, f, program, u)
     add_geometry(scene, T, y, f, scene.applied.axes[f], 0)
 
@@ -130,7 +132,8 @@ def add_scalar_slopes(scene: Scene, T: Tangent, t: float, y: F1, f: int) -> None
     none, at_j = (0.0, 0.0, 0.0), 0 if form == AXIS_FORCE_AT_I else 1
     n, x, rate = displacement(scene, y, f)
     turns, line = form == AXIS_TORQUE, form == LINE_FORCE
-    u = fill_unit(scene, T, y, f, none if turns else n, n if turns else none, at_j)
+    fill_unit(scene, T, y, f, none if turns else n, n if turns else none, at_j)
+    u = T.linear.basis[:, UNIT_ROW]
     if scene.applied.program[f] >= 0:
         add_program_slopes(scene, T, t, y, f, scene.applied.program[f], u)
         by_x, by_rate = 0.0, 0.0
@@ -153,7 +156,8 @@ def add_scalar_slopes(scene: Scene, T: Tangent, t: float, y: F1, f: int) -> None
         a = cross(n, (1.0, 0.0, 0.0) if abs(n[0]) < 0.6 else (0.0, 1.0, 0.0))
         a = scale(1.0 / norm(a), a)
         for e in (a, cross(n, a)):
-            u = fill_unit(scene, T, y, f, e, none, 1)
+            fill_unit(scene, T, y, f, e, none, 1)
+            u = T.linear.basis[:, UNIT_ROW]
             add_two_sided(P, L.K, nb, bi, bj, tension, u, u)
 
 

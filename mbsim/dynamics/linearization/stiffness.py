@@ -82,15 +82,14 @@ def sides_of(scene: Scene, f: int) -> tuple[int, int]:
 
 
 @jitable
-def fill_unit(scene: Scene, T: Tangent, y: F1, f: int, force: V3, torque: V3, at_j: int) -> F2:
-    """Fill the wrenches of a unit force and torque: on I at its origin, on J at its own or I's."""
+def fill_unit(scene: Scene, T: Tangent, y: F1, f: int, force: V3, torque: V3, at_j: int) -> None:
+    """Fill UNIT_ROW by a unit force and torque: on I at its origin, on J at its own or I's."""
     i, j = scene.applied.i[f], scene.applied.j[f]
     bi, bj = sides_of(scene, f)
     u = T.linear.basis[:, UNIT_ROW]
     lever(scene, T.linear, y, bi, marker_point(scene, y, i), force, torque, u[0])
     p = marker_point(scene, y, j if at_j == 1 else i)
     lever(scene, T.linear, y, bj, p, force, torque, u[1])
-    return u
 
 
 @jitable

@@ -13,9 +13,8 @@ from mbsim.dynamics.contact.fcl_points import another_point, bounding_gap
 from mbsim.dynamics.contact.fixed_step import hold_back
 from mbsim.dynamics.contact.forces import add_contact, contact_of
 from mbsim.dynamics.contact.memory import commit_memory, keep, remember
-from mbsim.dynamics.contact.patch_slots import keep_slots
 from mbsim.dynamics.contact.peaks import watch_end, watch_inside
-from mbsim.dynamics.contact.points import commit_gaps, commit_incidents
+from mbsim.dynamics.contact.points import commit_gaps, commit_incidents, keep_slots
 from mbsim.dynamics.contact.spreading import ask_over_patch
 from mbsim.dynamics.contact.tilting import damp_tilting
 from mbsim.dynamics.events.contact_stability import add_all_meeting, add_all_touching

@@ -1,9 +1,9 @@
-"""Hooks of applied forces, expressions, followed angles and friction that is held."""
+"""Hooks of applied forces, elements, expressions, followed angles and friction that is held."""
 
 from __future__ import annotations
 
 from mbsim.arrays.codes import FOLD_HALT
-from mbsim.arrays.hooks import Gauges, Hook, failure_or
+from mbsim.arrays.hooks import Gauges, Hook, failure_or, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_float, vector_at, view
 from mbsim.core.arrays import F1, Pointer
@@ -14,6 +14,7 @@ from mbsim.dynamics.expressions.jets import fill_values
 from mbsim.dynamics.expressions.states import add_slopes
 from mbsim.dynamics.expressions.values import evaluate_program
 from mbsim.dynamics.forces.applied import add_applied, serve_kept
+from mbsim.dynamics.forces.force_element import keep_residuals, serve_residual
 from mbsim.dynamics.forces.gravity import add_weight
 from mbsim.dynamics.forces.joint_friction import add_friction
 from mbsim.dynamics.forces.reaction_forces import add_reaction_forces
@@ -127,3 +128,31 @@ def limit_turn(context: int, t: float, h: float, a: Pointer, b: Pointer) -> floa
     longest = longest_turn(scene, longest)
     halt = scene.sweep.quality[FOLD_HALT]
     return min(longest, halt - t) if halt > t else longest
+
+
+def serve_element(context: int, t: float, y: Pointer, element: int, component: int) -> int:
+    """What an element gives."""
+    scene = view(context, Scene)
+    return serve_residual(scene, t, vector_at(y, scene.rows.y.shape[1]), element, component)
+
+
+def keep_elements(context: int, what: int, t: float, y: Pointer) -> int:
+    """What elements keep of an accepted step."""
+    scene = view(context, Scene)
+    return keep_residuals(scene, what, t, vector_at(y, scene.rows.y.shape[1]))
+
+
+def keep_with_dry(context: int, what: int, t: float, y: Pointer) -> int:
+    """The same, and what dry friction keeps."""
+    scene = view(context, Scene)
+    a = vector_at(y, scene.rows.y.shape[1])
+    note_failure(scene, keep_residuals(scene, what, t, a))
+    return serve_kept(scene, what, t, a)
+
+
+def keep_with_rigid(context: int, what: int, t: float, y: Pointer) -> int:
+    """The same where some is rigid."""
+    scene = view(context, Scene)
+    a = vector_at(y, scene.rows.y.shape[1])
+    note_failure(scene, keep_residuals(scene, what, t, a))
+    return serve_rigid(scene, what, t, a)

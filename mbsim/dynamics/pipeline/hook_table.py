@@ -211,12 +211,10 @@ def _needs_slopes(scene: Scene, method: Method) -> bool:
 
 def _slopes(scene: Scene) -> Callable[..., Any]:
     forms = set(scene.applied.form.tolist())
-    if RESIDUAL in forms:
-        from mbsim.dynamics.pipeline.element_hooks import residual_slopes
-
-        return residual_slopes
     from mbsim.dynamics.pipeline import implicit_hooks as of
 
+    if RESIDUAL in forms:
+        return of.residual_slopes
     has_friction = bool((scene.applied.connection >= 0).any())
     if WRENCH in forms:
         return of.slopes_with_both if has_friction else of.slopes_with_marker_forces
@@ -231,16 +229,14 @@ def _has_dry(scene: Scene, method: Method) -> bool:
 def _dry(scene: Scene) -> Callable[..., Any]:
     """Return what keeps of a step what there is: elements, dry friction, rigid friction."""
     rigid = bool((scene.applied.equation >= 0).any() or scene.contacts.rigid.any())
-    if len(scene.residuals.id) > 0:
-        from mbsim.dynamics.pipeline import element_hooks as of
+    from mbsim.dynamics.pipeline import force_hooks as of
 
+    if len(scene.residuals.id) > 0:
         if rigid:
             return of.keep_with_rigid
         dry = scene.applied.keeps.any()
         return of.keep_with_dry if dry else of.keep_elements
-    from mbsim.dynamics.pipeline.force_hooks import serve_dry_alone, serve_rigid_alone
-
-    return serve_rigid_alone if rigid else serve_dry_alone
+    return of.serve_rigid_alone if rigid else of.serve_dry_alone
 
 
 def _has_angles(scene: Scene, method: Method) -> bool:
@@ -342,7 +338,7 @@ TABLE = (
         Hook.ELEMENT,
         _INT(_INT, _T, _PTR, _INT, _INT),  # context, t, y, element, component
         _has_elements,
-        _of("pipeline.element_hooks", "serve_element"),
+        _of("pipeline.force_hooks", "serve_element"),
         "solves a Force_Element for what expressions ask of it",
     ),
     Row(

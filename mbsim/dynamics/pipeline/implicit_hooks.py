@@ -7,10 +7,14 @@ from mbsim.arrays.hooks import ContactSlopes, FaceSlopes, Hook, failure_or
 from mbsim.arrays.scene import Scene
 from mbsim.compile_model.tangent import Tangent
 from mbsim.core.address import vector_at, view
-from mbsim.core.arrays import Pointer
+from mbsim.core.arrays import F1, Pointer
 from mbsim.core.codes import Code
+from mbsim.core.jitable import jitable
 from mbsim.dynamics.linearization.applied_slopes import add_applied_slopes
-from mbsim.dynamics.linearization.connection_slopes import add_joint_frictions_slopes
+from mbsim.dynamics.linearization.connection_slopes import (
+    add_joint_frictions_slopes,
+    add_marker_forces_slopes,
+)
 from mbsim.dynamics.linearization.contact_slopes import (
     add_contacts_slopes,
     add_moves_of_centre,
@@ -18,8 +22,8 @@ from mbsim.dynamics.linearization.contact_slopes import (
     couple_contacts,
     resist_tilting,
 )
+from mbsim.dynamics.linearization.element_slopes import add_all_residual_slopes
 from mbsim.dynamics.linearization.expression_slopes import fill_state_slopes
-from mbsim.dynamics.linearization.marker_force_slopes import add_marker_forces_slopes
 from mbsim.dynamics.linearization.mechanism import add_bends, linearise
 from mbsim.dynamics.linearization.motion_slopes import add_motion_rows
 from mbsim.dynamics.linearization.newton_matrix import factor, solve
@@ -75,11 +79,17 @@ def _solve_pair(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int
     return failure_or(scene, code)
 
 
-def slopes(context: int, t: float, y: Pointer) -> int:
-    """The derivatives of forces between markers and of states' slopes."""
+@jitable
+def placed(context: int, y: Pointer) -> tuple[Scene, Tangent, F1]:
+    """Return the scene and the tangent that stand behind `context`, and y as an array."""
     scene = view(context, Scene)
     T = view(scene.world.hooks[Hook.TANGENT], Tangent)
-    a = vector_at(y, scene.rows.y.shape[1])
+    return scene, T, vector_at(y, scene.rows.y.shape[1])
+
+
+def slopes(context: int, t: float, y: Pointer) -> int:
+    """The derivatives of forces between markers and of states' slopes."""
+    scene, T, a = placed(context, y)
     code = add_applied_slopes(scene, T, t, a)
     fill_state_slopes(scene, T, t, a)
     return code
@@ -87,9 +97,7 @@ def slopes(context: int, t: float, y: Pointer) -> int:
 
 def slopes_with_marker_forces(context: int, t: float, y: Pointer) -> int:
     """The same, of marker forces too."""
-    scene = view(context, Scene)
-    T = view(scene.world.hooks[Hook.TANGENT], Tangent)
-    a = vector_at(y, scene.rows.y.shape[1])
+    scene, T, a = placed(context, y)
     code = add_applied_slopes(scene, T, t, a)
     add_marker_forces_slopes(scene, T, a)
     fill_state_slopes(scene, T, t, a)
@@ -98,9 +106,7 @@ def slopes_with_marker_forces(context: int, t: float, y: Pointer) -> int:
 
 def slopes_with_joint_friction(context: int, t: float, y: Pointer) -> int:
     """The same, of friction in joints instead."""
-    scene = view(context, Scene)
-    T = view(scene.world.hooks[Hook.TANGENT], Tangent)
-    a = vector_at(y, scene.rows.y.shape[1])
+    scene, T, a = placed(context, y)
     code = add_applied_slopes(scene, T, t, a)
     add_joint_frictions_slopes(scene, T, t, a)
     fill_state_slopes(scene, T, t, a)
@@ -109,13 +115,22 @@ def slopes_with_joint_friction(context: int, t: float, y: Pointer) -> int:
 
 def slopes_with_both(context: int, t: float, y: Pointer) -> int:
     """The same, of both."""
-    scene = view(context, Scene)
-    T = view(scene.world.hooks[Hook.TANGENT], Tangent)
-    a = vector_at(y, scene.rows.y.shape[1])
+    scene, T, a = placed(context, y)
     code = add_applied_slopes(scene, T, t, a)
     add_marker_forces_slopes(scene, T, a)
     add_joint_frictions_slopes(scene, T, t, a)
     fill_state_slopes(scene, T, t, a)
+    return code
+
+
+def residual_slopes(context: int, t: float, y: Pointer) -> int:
+    """The derivatives of all forces between markers, elements among them, and of states' slopes."""
+    scene, T, a = placed(context, y)
+    code = add_applied_slopes(scene, T, t, a)
+    add_marker_forces_slopes(scene, T, a)
+    add_joint_frictions_slopes(scene, T, t, a)
+    fill_state_slopes(scene, T, t, a)
+    add_all_residual_slopes(scene, T, t, a)
     return code
 
 
@@ -152,9 +167,7 @@ def bend(context: int, t: float, y: Pointer) -> int:
 
 def bend_and_drive(context: int, t: float, y: Pointer) -> int:
     """The same, and the rows of motions of velocities and accelerations."""
-    scene = view(context, Scene)
-    T = view(scene.world.hooks[Hook.TANGENT], Tangent)
-    a = vector_at(y, scene.rows.y.shape[1])
+    scene, T, a = placed(context, y)
     add_bends(scene, T, t, a)
     add_motion_rows(scene, T, t, a)
     return 0

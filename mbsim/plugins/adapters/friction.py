@@ -127,5 +127,7 @@ def friction_address(
     for each in (*callees, function):
         register_jitable(error_model="python", boundscheck=True)(each)
     if states:
-        return jit.address(_adapt_with_state(function, count, states), FRICTION_SIGNATURE)
-    return jit.address(_adapt(function, count), FRICTION_SIGNATURE)
+        return jit.address(
+            _adapt_with_state(function, count, states), FRICTION_SIGNATURE, allocates=True
+        )
+    return jit.address(_adapt(function, count), FRICTION_SIGNATURE, allocates=True)

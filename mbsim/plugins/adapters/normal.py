@@ -167,4 +167,4 @@ def normal_address(function: Callable[..., Any], callees: list[Any], count: int)
     """Return the address of a rewritten CNFSUB behind NORMAL_SIGNATURE."""
     for each in (*callees, function):
         register_jitable(error_model="python", boundscheck=True)(each)
-    return jit.address(_adapt(function, count), NORMAL_SIGNATURE)
+    return jit.address(_adapt(function, count), NORMAL_SIGNATURE, allocates=True)

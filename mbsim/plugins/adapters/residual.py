@@ -32,7 +32,8 @@ def _adapt(function: Callable[..., Any], count: int, axes: int, unknowns: int) -
         result = vector_at(out, unknowns)
         code = 0
         try:
-            found = function(x, xdot, f, fdot, a[0], values, a[0])
+            # as every function of users' it is given time and area of contact: here is none
+            found = function(x, xdot, f, fdot, a[0], values, a[0], 0.0)
             if len(found) != unknowns:
                 raise ValueError("not as many")
             for k in range(unknowns):
@@ -50,4 +51,4 @@ def residual_address(
     """Return the address of a rewritten residual behind FRICTION_SIGNATURE."""
     for each in (*callees, function):
         register_jitable(error_model="python", boundscheck=True)(each)
-    return jit.address(_adapt(function, count, axes, unknowns), FRICTION_SIGNATURE)
+    return jit.address(_adapt(function, count, axes, unknowns), FRICTION_SIGNATURE, allocates=True)
