@@ -256,6 +256,41 @@ def place_in(table: I1, pairs: F2, a: int, b: int) -> int:
 
 
 @jitable
+def edge_towards(beside: F1, at: int, other: int) -> int:
+    """Return the edge of a triangle, whose neighbours' numbers begin at `at`, towards a neighbour.
+
+    0 where it is none.
+    """
+    for e in range(3):
+        if int(beside[at + e]) == other:
+            return e
+    return 0
+
+
+@jitable
+def across_both(mesh_i: F1, mesh_j: F1, table: I1, pairs: F2, values: F2, k: int, e: int) -> int:
+    """Return the node beyond edge e of pair k where that lies on an edge of the other triangle.
+
+    Then the neighbour there has no piece with that triangle, but with one of its neighbours, and
+    psi on the same edge. -1 for none.
+    """
+    a, b, of_i = int(pairs[k, 0]), int(pairs[k, 1]), e < 3
+    here, mesh = (a, mesh_i) if of_i else (b, mesh_j)
+    at_i = int(mesh_i[AT_TRIANGLES]) + TRIANGLE * a + BESIDE
+    at_j = int(mesh_j[AT_TRIANGLES]) + TRIANGLE * b + BESIDE
+    beyond = int(mesh_i[at_i + e]) if of_i else int(mesh_j[at_j + e - 3])
+    back = edge_towards(mesh, int(mesh[AT_TRIANGLES]) + TRIANGLE * beyond + BESIDE, here)
+    for f in range(3):
+        if of_i:
+            m = table[place_in(table, pairs, beyond, int(mesh_j[at_j + f]))]
+        else:
+            m = table[place_in(table, pairs, int(mesh_i[at_i + f]), beyond)]
+        if m >= 0 and values[m, back if of_i else 3 + back] > 0.0:
+            return m
+    return -1
+
+
+@jitable
 def partners_of(mesh_i: F1, mesh_j: F1, count: int, values: F2, pairs: F2) -> I2:
     """Return the nodes beyond the six edges of each pair of triangles, -1 for none."""
     size = 16
@@ -274,4 +309,7 @@ def partners_of(mesh_i: F1, mesh_j: F1, count: int, values: F2, pairs: F2) -> I2
                 partners[k, e] = table[place_in(table, pairs, int(mesh_i[beside_i + e]), b)]
             if values[k, 3 + e] > 0.0:
                 partners[k, 3 + e] = table[place_in(table, pairs, a, int(mesh_j[beside_j + e]))]
+        for e in range(EDGES):
+            if values[k, e] > 0.0 and partners[k, e] < 0:
+                partners[k, e] = across_both(mesh_i, mesh_j, table, pairs, values, k, e)
     return partners
