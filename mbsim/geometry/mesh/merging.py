@@ -210,12 +210,24 @@ def strongest(peaks: F2, count: int, most: int) -> int:
                 best = k
         if presses(peaks[best]) <= LEAST * peaks[0, 0]:
             break
-        for c in range(PEAK_NUMBERS):
-            peaks[kept, c], peaks[best, c] = peaks[best, c], peaks[kept, c]
+        exchange_peaks(peaks, kept, best)
         kept += 1
     if kept == most:
         gather_rest(peaks, count, most - 1)
+        # of as strong ones it takes all, and a point without force is none
+        exchange_peaks(peaks, 0, most - 1)
+        for k in range(most - 1, 0, -1):
+            if presses(peaks[k]) <= LEAST * presses(peaks[0]):
+                kept -= 1
+                exchange_peaks(peaks, k, kept)
     return kept
+
+
+@jitable
+def exchange_peaks(peaks: F2, a: int, b: int) -> None:
+    """Exchange two peaks."""
+    for c in range(PEAK_NUMBERS):
+        peaks[a, c], peaks[b, c] = peaks[b, c], peaks[a, c]
 
 
 @jitable
