@@ -53,9 +53,12 @@ def norm(a: V3) -> float:
 
 
 @jitable
-def vector(array: F1) -> V3:
-    """Return the first three numbers of an array as a tuple."""
-    return (array[0], array[1], array[2])
+def vector(array: F1, at: int = 0) -> V3:
+    """Return three numbers of an array, from place `at` on, as a tuple.
+
+    A slice of an array takes several times as long to make as they take to read.
+    """
+    return (array[at], array[at + 1], array[at + 2])
 
 
 @jitable

@@ -81,12 +81,12 @@ def moved(hull: F1, frame_i: F1, frame_j: F1) -> F1:
     t = (dot(shift, x), dot(shift, y), dot(shift, z))
     at = int(hull[AT_CORNERS])
     for _ in range(int(hull[CORNERS])):
-        p = add(to_global(frame_i, vector(hull[at:])), shift)
+        p = add(to_global(frame_i, vector(hull, at)), shift)
         out[at], out[at + 1], out[at + 2] = dot(p, x), dot(p, y), dot(p, z)
         at += 3
     at = int(hull[AT_PLANES])
     for _ in range(int(hull[FACES])):
-        m = to_global(frame_i, vector(hull[at:]))
+        m = to_global(frame_i, vector(hull, at))
         m = (dot(m, x), dot(m, y), dot(m, z))
         out[at], out[at + 1], out[at + 2] = m[0], m[1], m[2]
         out[at + 3] = hull[at + 3] + dot(m, t)
@@ -105,13 +105,13 @@ def to_global(frame: F1, d: V3) -> V3:
 @jitable
 def corner(hull: F1, k: int) -> V3:
     """Return corner k."""
-    return vector(hull[int(hull[AT_CORNERS]) + 3 * int(k) :])
+    return vector(hull, int(hull[AT_CORNERS]) + 3 * int(k))
 
 
 @jitable
 def plane(hull: F1, f: float) -> V3:
     """Return the outward normal of face f."""
-    return vector(hull[int(hull[AT_PLANES]) + 4 * int(f) :])
+    return vector(hull, int(hull[AT_PLANES]) + 4 * int(f))
 
 
 @jitable
@@ -120,9 +120,9 @@ def faces_overlap(a: F1, b: F1) -> tuple[float, int, int]:
     least, face, low = math.inf, 0, 0
     at, first, count = int(a[AT_PLANES]), int(b[AT_CORNERS]), int(b[CORNERS])
     for f in range(int(a[FACES])):
-        m, deepest, which = vector(a[at:]), -math.inf, 0
+        m, deepest, which = vector(a, at), -math.inf, 0
         for k in range(count):
-            depth = a[at + 3] - dot(m, vector(b[first + 3 * k :]))
+            depth = a[at + 3] - dot(m, vector(b, first + 3 * k))
             if depth > deepest:
                 deepest, which = depth, k
         if deepest < least:
@@ -372,7 +372,7 @@ def way_out(hull: F1, c: V3) -> tuple[float, V3]:
     top, face = -math.inf, 0
     at = int(hull[AT_PLANES])
     for f in range(int(hull[FACES])):
-        height = dot(vector(hull[at + 4 * f :]), c) - hull[at + 4 * f + 3]
+        height = dot(vector(hull, at + 4 * f), c) - hull[at + 4 * f + 3]
         if height > top:
             top, face = height, f
     if top <= 0.0:
@@ -380,7 +380,7 @@ def way_out(hull: F1, c: V3) -> tuple[float, V3]:
     least, n = math.inf, plane(hull, face)
     for f in range(int(hull[FACES])):
         # the nearest point is on a face that c is above
-        if dot(vector(hull[at + 4 * f :]), c) > hull[at + 4 * f + 3]:
+        if dot(vector(hull, at + 4 * f), c) > hull[at + 4 * f + 3]:
             away = sub(c, nearest_on_face(hull, f, c))
             distance = norm(away)
             if distance < least and distance > 0.0:

@@ -3,7 +3,7 @@
 The explicit method estimates the largest rate of f from its last stages (`dopri5.stiffness`). Where
 the step times that is at the bound of stability, stability and not the error bounds the steps: the
 model is stiff. Of a step that is cut at an event the whole one is meant, as it was tried before.
-From a loose tolerance steps go beyond that bound; where that costs something, they are kept within.
+The error lets steps go beyond that bound; where many are at it, they are kept within.
 
 The implicit method tries an explicit step now and then. What its own last steps took, less what
 explicit ones would have taken instead, is summed up; where that is as much as it would cost to be
@@ -67,6 +67,8 @@ BOUND, WITHIN = 1.6, 1.8
 NOTHING = 1e-10
 #: A step that is shorter than this part of one that was stiff is for what that has thrown.
 THROWS = 0.1
+#: Steps found stiff one after the other from which on none goes beyond the bound: a kink is one.
+STEADY = 3
 #: Steps found stiff before AUTO changes over, and others that make it forget them.
 FIRST_PATIENCE, FORGET = 15, 6
 #: Steps over which their number a time is taken: an impact is shorter.
@@ -91,14 +93,24 @@ WRONG, SHORT_TELLS = EVALUATIONS_A_STEP * FIRST_PATIENCE + IMPLICIT_START, 0.2
 
 
 @jitable
+def is_bounded(m: Method) -> bool:
+    """Return whether the next explicit step is to end within the bound of stability.
+
+    The error lets steps beyond it pass as long as what they amplify is within the tolerance. Where
+    stability bounds one step after the other, what rests then trembles at the tolerance for good
+    (a cube on a slope at 1e-5 rad/s; within the bound at 1e-11, in as many steps). A loose
+    tolerance lets such steps throw what rests into the air, or what friction holds into slip: where
+    far shorter ones came behind stiff ones no step goes beyond any more. Nor where the implicit
+    method may begin soon: from what flies about it takes long.
+    """
+    return m.memory[BOUNDED] == 1.0 or m.memory[STIFF_STEPS] >= STEADY
+
+
+@jitable
 def stay_within(m: Method, h: float, error: float) -> None:
     """Let the step after one of length h and this error end within the bound of stability.
 
-    The error lets steps beyond it pass as long as what they amplify is within the tolerance. Mostly
-    that does no harm. But a loose one lets them throw what rests into the air, or what friction
-    holds into slip, and all that follows costs steps: where far shorter ones came behind stiff ones
-    no step goes beyond any more. Nor where the implicit method may begin soon: from what flies
-    about it takes long. A step is no more than halved, for a kink looks like a high rate.
+    A step is no more than halved, for a kink looks like a high rate.
     """
     if m.memory[STIFFNESS] > 0.0 and error > NOTHING:
         m.memory[STEP] = min(m.memory[STEP], max(0.5, WITHIN / m.memory[STIFFNESS]) * h)

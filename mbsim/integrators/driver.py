@@ -35,7 +35,7 @@ from mbsim.core.problem import (
 )
 from mbsim.integrators.attempt import LOCATED, attempt_to_event
 from mbsim.integrators.branches import BEGIN, TAKEN
-from mbsim.integrators.changing import changes_over, stay_within
+from mbsim.integrators.changing import changes_over, is_bounded, stay_within
 from mbsim.integrators.control import (
     HOLD,
     extrapolated_factor,
@@ -46,7 +46,6 @@ from mbsim.integrators.control import (
 )
 from mbsim.integrators.scheme import (
     AFTER_REJECTION,
-    BOUNDED,
     CHANGE_DUE,
     CODE,
     CORRECTION,
@@ -441,7 +440,7 @@ def advance(  # noqa: C901
             m.memory[STEP] = max(m.memory[STEP], min(CUT_GROW, factor) * most)
         m.memory[STEP] = max(m.memory[STEP], m.memory[CUT_FROM])
         m.memory[CUT_FROM] = 0.0
-        if m.memory[BOUNDED] == 1.0 and not steps.implicit:
+        if is_bounded(m) and not steps.implicit:
             stay_within(m, most, uncut)
         m.memory[WAS_CUT] = 1.0 if h < whole else 0.0
         word = accept(p, m, steps, t, h, asked)

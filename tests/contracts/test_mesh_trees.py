@@ -91,9 +91,9 @@ def test_boxes_with_a_common_point_have_room():
     shared = 0
     for _ in range(300):
         a, b, pose = random_node(rng), random_node(rng), random_pose(rng, 0.5)
-        room = ways_between(a, b, I_IN_J | J_IN_I, pose)
+        room = ways_between(a, 0, b, 0, I_IN_J | J_IN_I, pose)
         assert room in (0, I_IN_J | J_IN_I)
-        distance = box_distance(a, THIN, b, THIN, pose)
+        distance = box_distance(a, 0, b, 0, pose)
         assert (distance == 0.0) == (room > 0)
         own = (2.0 * rng.random((400, 3)) - 1.0) * a[THIN + 3 : DEEP]
         points = a[THIN : THIN + 3] + own @ a[:9].reshape(3, 3)
@@ -113,11 +113,11 @@ def test_each_way_asks_for_the_boxes_of_its_own():
     thin, deep = [0.0, 0.0, 0.0, 0.4, 1.0, 1.0], [0.0, 0.0, 0.0, 0.7, 1.0, 1.0]
     plain = np.array([*upright, *thin, *thin, 0.0, 0.0])
     layered = np.array([*upright, *thin, *deep, 0.0, 0.0])
-    assert ways_between(plain, plain, I_IN_J | J_IN_I, pose) == 0
-    assert ways_between(plain, layered, I_IN_J | J_IN_I, pose) == I_IN_J
-    assert ways_between(layered, plain, I_IN_J | J_IN_I, pose) == J_IN_I
-    assert ways_between(layered, layered, I_IN_J | J_IN_I, pose) == I_IN_J | J_IN_I
-    assert ways_between(layered, layered, J_IN_I, pose) == J_IN_I
+    assert ways_between(plain, 0, plain, 0, I_IN_J | J_IN_I, pose) == 0
+    assert ways_between(plain, 0, layered, 0, I_IN_J | J_IN_I, pose) == I_IN_J
+    assert ways_between(layered, 0, plain, 0, I_IN_J | J_IN_I, pose) == J_IN_I
+    assert ways_between(layered, 0, layered, 0, I_IN_J | J_IN_I, pose) == I_IN_J | J_IN_I
+    assert ways_between(layered, 0, layered, 0, J_IN_I, pose) == J_IN_I
 
 
 @pytest.mark.parametrize("name", ["box", "angle", "torus"])

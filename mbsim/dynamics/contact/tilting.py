@@ -15,6 +15,7 @@ from mbsim.dynamics.contact.forces import (
     ask_normal,
     contact_of,
     face_weight_of,
+    is_patch,
     patch,
     sides,
 )
@@ -22,6 +23,7 @@ from mbsim.geometry.catalog import (
     AT_DEPTH,
     AT_NORMAL,
     AT_POINT,
+    AT_WEIGHT,
     MOMENT_XX,
     MOMENT_XY,
     MOMENT_YY,
@@ -55,7 +57,9 @@ def damp_tilting(scene: Scene, t: float, y: F1, s: int, normal: float) -> int:
     """
     at, depth, w = place_of(scene, s)
     work, out, c = scene.work, scene.work.law_out, contact_of(scene, s)
-    numbers, row, whole = work.points[s + 1], work.slot[s], face_weight_of(scene, s)
+    numbers, row = work.points[s + 1], work.slot[s]
+    # the weights that the moments are made of: of a field the area of its patch
+    whole = work.points[s, AT_WEIGHT] if is_patch(scene, s) else face_weight_of(scene, s)
     xx, xy, yy = numbers[MOMENT_XX], numbers[MOMENT_XY], numbers[MOMENT_YY]
     row[TILTING] = row[LOST] = 0.0
     for k in range(3):

@@ -151,7 +151,7 @@ def add_touching(scene: Scene, y: F1, s: int, out: F1) -> None:
             # tilting about the centre of a patch
             moments = work.points[s + 1, MOMENT_XX] + work.points[s + 1, MOMENT_YY]
             inverse = bodies.inverse[b]
-            turn += moments * (inverse[0, 0] + inverse[1, 1] + inverse[2, 2])
+            turn += moments / weight * (inverse[0, 0] + inverse[1, 1] + inverse[2, 2])
         add_to_block(work.block[b], n, both * k, both * damping, turn)
 
 

@@ -51,8 +51,8 @@ def nearest_on_triangle(mesh: F1, at: int, c: V3, edges: F1) -> tuple[V3, int]:
 
     `edges` gets the squared distances of the edges.
     """
-    corners = (vector(mesh[at:]), vector(mesh[at + 3 :]), vector(mesh[at + 6 :]))
-    n, inside, part, best = vector(mesh[at + UNIT :]), True, ON_FACE, math.inf
+    corners = (vector(mesh, at), vector(mesh, at + 3), vector(mesh, at + 6))
+    n, inside, part, best = vector(mesh, at + UNIT), True, ON_FACE, math.inf
     found = corners[0]
     for k in range(3):
         p, q = corners[k], corners[k + 1 if k < 2 else 0]
@@ -77,13 +77,13 @@ def nearest_on_triangle(mesh: F1, at: int, c: V3, edges: F1) -> tuple[V3, int]:
 @jitable
 def normal_at(mesh: F1, at: int, part: int) -> V3:
     """Return a normal that tells outside from inside for points nearest to part of a triangle."""
-    n = vector(mesh[at + UNIT :])
+    n = vector(mesh, at + UNIT)
     if part == ON_FACE:
         return n
     if part >= ON_CORNER:
-        return vector(mesh[at + CORNER_NORMAL + 3 * (part - ON_CORNER) :])
+        return vector(mesh, at + CORNER_NORMAL + 3 * (part - ON_CORNER))
     other = int(mesh[AT_TRIANGLES]) + TRIANGLE * int(mesh[at + BESIDE + part])
-    return add(n, vector(mesh[other + UNIT :]))
+    return add(n, vector(mesh, other + UNIT))
 
 
 @jitable
@@ -175,16 +175,16 @@ def box_on_way(mesh: F1, at: int, p: V3, d: V3, reach: float) -> bool:
 @jitable
 def leaves_through(mesh: F1, at: int, p: V3, d: V3, reach: float) -> bool:
     """Return whether the way from p along d, so long, goes out through a triangle, about square."""
-    n = vector(mesh[at + UNIT :])
+    n = vector(mesh, at + UNIT)
     slope = dot(d, n)
     if slope < SQUARE:
         return False
-    way = dot(sub(vector(mesh[at:]), p), n) / slope
+    way = dot(sub(vector(mesh, at), p), n) / slope
     if way <= AT_START * reach or way > reach:
         return False
     x = add(p, scale(way, d))
     for k in range(3):
-        q, r = vector(mesh[at + 3 * k :]), vector(mesh[at + 3 * (k + 1 if k < 2 else 0) :])
+        q, r = vector(mesh, at + 3 * k), vector(mesh, at + 3 * (k + 1 if k < 2 else 0))
         if dot(cross(sub(r, q), sub(x, q)), n) < 0.0:
             return False
     return True
@@ -196,9 +196,9 @@ def through_wall(mesh: F1, row: F1, radius: float) -> bool:
 
     The depth is more than w, or the centre deeper than 0.36 w, as deep as a layer would be.
     """
-    depth, n = row[0], vector(row[NEAR_NORMAL:])
+    depth, n = row[0], vector(row, NEAR_NORMAL)
     reach = max(depth, (depth - radius) / OF_WALL)
-    p, d = vector(row[NEAR_POINT:]), scale(-1.0, n)
+    p, d = vector(row, NEAR_POINT), scale(-1.0, n)
     waiting = np.empty(WAITING, np.int64)
     boxes, leaves = int(mesh[AT_BOXES]), 1 << int(mesh[LEVELS])
     waiting[0], count = 1, 1
@@ -283,7 +283,7 @@ def merge_points(rows: F2, links: F2, partners: I2) -> None:
 @jitable
 def press(row: F1) -> tuple[float, V3]:
     """Return depth times weight of a point, and its normal of length 1."""
-    n = vector(row[NEAR_NORMAL:])
+    n = vector(row, NEAR_NORMAL)
     return row[0] * row[NEAR_WEIGHT], scale(1.0 / norm(n), n)
 
 
@@ -292,7 +292,7 @@ def add_to_nearest(rows: F2, kept: int, lost: F1) -> None:
     """Let the nearest of the points kept press as it and a lost one do, by a linear law."""
     nearest, least = 0, math.inf
     for k in range(kept):
-        away = norm(sub(vector(rows[k, NEAR_POINT:]), vector(lost[NEAR_POINT:])))
+        away = norm(sub(vector(rows[k, NEAR_POINT:]), vector(lost, NEAR_POINT)))
         if away < least:
             nearest, least = k, away
     row = rows[nearest]

@@ -9,10 +9,9 @@ import numpy as np
 from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, norm, sub, vector
-from mbsim.geometry.mesh.oriented import box_distance, extent, node_of, place
+from mbsim.geometry.mesh.oriented import box_distance, extent, node_at, place
 from mbsim.geometry.mesh.tree import WAITING, leaf_range
 from mbsim.model.surface import AT_TRIANGLES, LEVELS, TRIANGLE
-from mbsim.model.surface_tree import THIN
 
 #: A direction shorter than this part of its factors' product has none.
 SHORT = 1e-9
@@ -51,7 +50,7 @@ def triangle_distance(p: tuple[V3, V3, V3], q: tuple[V3, V3, V3]) -> float:
 def triangle_of(mesh: F1, t: int) -> tuple[V3, V3, V3]:
     """Return the corners of a triangle in the mesh's axes."""
     at = int(mesh[AT_TRIANGLES]) + TRIANGLE * t
-    return (vector(mesh[at:]), vector(mesh[at + 3 :]), vector(mesh[at + 6 :]))
+    return (vector(mesh, at), vector(mesh, at + 3), vector(mesh, at + 6))
 
 
 @jitable
@@ -83,12 +82,14 @@ def least_gap(mesh_i: F1, mesh_j: F1, pose: F1) -> float:
             best = leaf_distance(mesh_i, i, mesh_j, j, pose, best)
             continue
         of_i = i < leaves_i and (
-            j >= leaves_j or extent(node_of(mesh_i, i)) > extent(node_of(mesh_j, j))
+            j >= leaves_j or extent(mesh_i, node_at(mesh_i, i)) > extent(mesh_j, node_at(mesh_j, j))
         )
         for k in range(2):
             a, b = (2 * i + k, j) if of_i else (i, 2 * j + k)
             waiting[many + k, 0], waiting[many + k, 1] = a, b
-            far[many + k] = box_distance(node_of(mesh_i, a), THIN, node_of(mesh_j, b), THIN, pose)
+            far[many + k] = box_distance(
+                mesh_i, node_at(mesh_i, a), mesh_j, node_at(mesh_j, b), pose
+            )
         if far[many] < far[many + 1]:
             # the nearer one is looked at first, so it is put on last
             for c in range(2):

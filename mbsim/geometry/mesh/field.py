@@ -77,7 +77,7 @@ def join_connected(nodes: F2, partners: I2, above: I1) -> None:
 @jitable
 def centre_of(patch: F1) -> V3:
     """Return the centre of a patch's pressure, from the origin of its sums."""
-    return scale(1.0 / patch[PRESSURE], vector(patch[MOMENT:]))
+    return scale(1.0 / patch[PRESSURE], vector(patch, MOMENT))
 
 
 @jitable
@@ -112,17 +112,17 @@ def strongest_patches(nodes: F2, above: I1, most: int, kept: I1) -> int:
 @jitable
 def write_patch(patch: F1, frame: F1, origin: V3, points: F2) -> None:
     """Write a patch, measured in the axes of `frame` from `origin` (global), in its two rows."""
-    push, size = vector(patch[PUSH:]), norm(vector(patch[PUSH:]))
+    push, size = vector(patch, PUSH), norm(vector(patch, PUSH))
     c = centre_of(patch)
     depth = max(2.0 * patch[POTENTIAL] / size, LEAST_DEPTH * patch[PEAK])
     depth = min(depth, patch[PEAK])
     local = scale(1.0 / size, push)
     n = to_global(frame, local)
     put_point(points[0], depth, add(origin, to_global(frame, c)), n, size / depth)
-    rest = sub(vector(patch[TWIST:]), cross(c, push))
+    rest = sub(vector(patch, TWIST), cross(c, push))
     put_couple(points[0], scale(1.0 / depth, to_global(frame, rest)))
     numbers = points[1]
-    numbers[AREA] = norm(vector(patch[AREA_VECTOR:]))
+    numbers[AREA] = norm(vector(patch, AREA_VECTOR))
     numbers[MEAN_DEPTH] = size / numbers[AREA] if numbers[AREA] > 0.0 else 0.0
     spread = np.zeros(PEAK_NUMBERS)
     for k in range(6):
@@ -146,7 +146,7 @@ def write_patches(nodes: F2, partners: I2, frame: F1, origin: V3, points: F2) ->
     count, written = strongest_patches(nodes, above, most, kept), 0
     for k in range(count):
         patch = nodes[kept[k]]
-        if norm(vector(patch[PUSH:])) > 0.0:
+        if norm(vector(patch, PUSH)) > 0.0:
             at = REGION_ROWS * written
             write_patch(patch, frame, origin, points[at : at + REGION_ROWS])
             written += 1

@@ -115,7 +115,7 @@ def saddles(above: I1, links: F2, partners: I2) -> tuple[F1, I2]:
 @jitable
 def blend(peak: F1, patch: F1, part: float) -> None:
     """Let what a peak has but depth and weight be a part of what it is and the rest of a patch."""
-    push = vector(patch[PUSH:])
+    push = vector(patch, PUSH)
     size, pressure = norm(push), patch[PRESSURE]
     rest = 1.0 - part
     by_push = rest / size if size > 0.0 else 0.0
@@ -127,7 +127,7 @@ def blend(peak: F1, patch: F1, part: float) -> None:
         peak[NORMAL + k] += by_push * push[k]
     for k in range(6):
         peak[MOMENTS + k] += by_pressure * patch[SPREAD + k]
-    area = norm(vector(patch[AREA_VECTOR:]))
+    area = norm(vector(patch, AREA_VECTOR))
     peak[SURFACE] += rest * area
     peak[MEAN] += rest * size / area if area > 0.0 else 0.0
 
@@ -210,12 +210,24 @@ def strongest(peaks: F2, count: int, most: int) -> int:
                 best = k
         if presses(peaks[best]) <= LEAST * peaks[0, 0]:
             break
-        for c in range(PEAK_NUMBERS):
-            peaks[kept, c], peaks[best, c] = peaks[best, c], peaks[kept, c]
+        exchange_peaks(peaks, kept, best)
         kept += 1
     if kept == most:
         gather_rest(peaks, count, most - 1)
+        # of as strong ones it takes all, and a point without force is none
+        exchange_peaks(peaks, 0, most - 1)
+        for k in range(most - 1, 0, -1):
+            if presses(peaks[k]) <= LEAST * presses(peaks[0]):
+                kept -= 1
+                exchange_peaks(peaks, k, kept)
     return kept
+
+
+@jitable
+def exchange_peaks(peaks: F2, a: int, b: int) -> None:
+    """Exchange two peaks."""
+    for c in range(PEAK_NUMBERS):
+        peaks[a, c], peaks[b, c] = peaks[b, c], peaks[a, c]
 
 
 @jitable
@@ -259,7 +271,7 @@ def gather_rest(peaks: F2, count: int, own: int) -> None:
 @jitable
 def moment(peak: F1, p: V3, x: V3, y: V3) -> float:
     """Return the mean of (r.x) (r.y) over a peak's pressure, r from its centre p."""
-    m = vector(peak[MOMENTS:])
+    m = vector(peak, MOMENTS)
     xy, yz, zx = peak[MOMENTS + 3], peak[MOMENTS + 4], peak[MOMENTS + 5]
     total = m[0] * x[0] * y[0] + m[1] * x[1] * y[1] + m[2] * x[2] * y[2]
     total += xy * (x[0] * y[1] + x[1] * y[0]) + yz * (x[1] * y[2] + x[2] * y[1])
@@ -283,9 +295,9 @@ def write_points(peaks: F2, count: int, frame: F1, origin: V3, points: F2) -> No
         put_point(points[k], -0.0, origin, axis(frame, 2))
     for k in range(count):
         peak, row, numbers = peaks[k], points[REGION_ROWS * k], points[REGION_ROWS * k + 1]
-        n = vector(peak[NORMAL:])
+        n = vector(peak, NORMAL)
         n = to_global(frame, scale(1.0 / norm(n), n))
-        p = vector(peak[PLACE:])
+        p = vector(peak, PLACE)
         x, y = plane_axes(n)
         put_point(row, peak[0], add(origin, to_global(frame, p)), n, peak[1])
         numbers[AREA], numbers[MEAN_DEPTH] = peak[SURFACE], peak[MEAN]

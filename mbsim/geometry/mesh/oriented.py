@@ -6,9 +6,11 @@ import math
 
 from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import add, dot, scale, sub, vector
+from mbsim.core.rotation import add, dot, sub, vector
 from mbsim.model.surface import AT_ORIENTED
 from mbsim.model.surface_tree import DEEP, ORIENTED, THIN
+
+Axes = tuple[V3, V3, V3]
 
 #: Which surface may be in which layer: I's in J's, J's in I's.
 I_IN_J, J_IN_I = 1, 2
@@ -37,99 +39,112 @@ def place_back(pose: F1, p: V3) -> V3:
 @jitable
 def turn(pose: F1, d: V3) -> V3:
     """Return a vector of I's axes in J's."""
-    return (dot(vector(pose[3:]), d), dot(vector(pose[6:]), d), dot(vector(pose[9:]), d))
+    return (dot(vector(pose, 3), d), dot(vector(pose, 6), d), dot(vector(pose, 9), d))
 
 
 @jitable
-def node_of(mesh: F1, k: int) -> F1:
-    """Return the numbers of a node's oriented boxes, and what follows them."""
-    return mesh[int(mesh[AT_ORIENTED]) + ORIENTED * k :]
+def node_at(mesh: F1, k: int) -> int:
+    """Return where the numbers of a node's oriented boxes begin."""
+    return int(mesh[AT_ORIENTED]) + ORIENTED * k
 
 
 @jitable
-def extent(node: F1) -> float:
+def extent(mesh: F1, node: int) -> float:
     """Return half the sum of the edges of the box around a node's triangles."""
-    return node[THIN + 3] + node[THIN + 4] + node[THIN + 5]
+    return mesh[node + THIN + 3] + mesh[node + THIN + 4] + mesh[node + THIN + 5]
 
 
 @jitable
-def sizes(d: V3) -> V3:
-    """Return the absolute components of a vector."""
-    return (abs(d[0]), abs(d[1]), abs(d[2]))
+def axes_of(mesh: F1, node: int) -> Axes:
+    """Return the axes of a node in those of its mesh."""
+    return (vector(mesh, node), vector(mesh, node + 3), vector(mesh, node + 6))
 
 
 @jitable
-def axes_between(a: F1, b: F1, pose: F1) -> tuple[V3, V3, V3]:
-    """Return the axes of node a (of I) in those of node b (of J)."""
-    x, y, z = turn(pose, vector(a)), turn(pose, vector(a[3:])), turn(pose, vector(a[6:]))
-    u, v, w = vector(b), vector(b[3:]), vector(b[6:])
-    return (
-        (dot(u, x), dot(v, x), dot(w, x)),
-        (dot(u, y), dot(v, y), dot(w, y)),
-        (dot(u, z), dot(v, z), dot(w, z)),
-    )
+def turned_axes(mesh: F1, node: int, pose: F1) -> Axes:
+    """Return the axes of a node of I in J's axes."""
+    x, y, z = axes_of(mesh, node)
+    return (turn(pose, x), turn(pose, y), turn(pose, z))
 
 
 @jitable
-def offset(a: F1, at_a: int, b: F1, at_b: int, pose: F1) -> V3:
-    """Return the way from the centre of a box of node b to one of node a, in the axes of b."""
-    off = sub(place(pose, vector(a[at_a:])), vector(b[at_b:]))
-    return (dot(vector(b), off), dot(vector(b[3:]), off), dot(vector(b[6:]), off))
+def cosines(u: V3, axes: Axes) -> V3:
+    """Return the absolute cosines between a direction and three axes."""
+    return (abs(dot(u, axes[0])), abs(dot(u, axes[1])), abs(dot(u, axes[2])))
 
 
 @jitable
-def box_distance(a: F1, at_a: int, b: F1, at_b: int, pose: F1) -> float:
-    """Return a lower bound of the distance of two boxes: along an axis of one; 0 if none parts."""
-    axes, off = axes_between(a, b, pose), offset(a, at_a, b, at_b, pose)
-    half_a, half_b = vector(a[at_a + 3 :]), vector(b[at_b + 3 :])
-    x, y, z = sizes(axes[0]), sizes(axes[1]), sizes(axes[2])
-    gap = max(0.0, abs(dot(axes[0], off)) - half_a[0] - dot(x, half_b))
-    gap = max(gap, abs(dot(axes[1], off)) - half_a[1] - dot(y, half_b))
-    gap = max(gap, abs(dot(axes[2], off)) - half_a[2] - dot(z, half_b))
-    square = 0.0
+def offset(mesh_i: F1, box_i: int, mesh_j: F1, box_j: int, pose: F1) -> V3:
+    """Return the way from the centre of a box of J to one of I, in J's axes."""
+    return sub(place(pose, vector(mesh_i, box_i)), vector(mesh_j, box_j))
+
+
+@jitable
+def box_distance(mesh_i: F1, i: int, mesh_j: F1, j: int, pose: F1) -> float:
+    """Return a lower bound of the distance of the triangles' boxes of nodes at i and j.
+
+    Along an axis of one; 0 if none parts them.
+    """
+    axes_i, (u, v, w) = turned_axes(mesh_i, i, pose), axes_of(mesh_j, j)
+    off = offset(mesh_i, i + THIN, mesh_j, j + THIN, pose)
+    half_i, half_j = vector(mesh_i, i + THIN + 3), vector(mesh_j, j + THIN + 3)
+    a, b, c = cosines(u, axes_i), cosines(v, axes_i), cosines(w, axes_i)
+    gap, square = 0.0, 0.0
     for k in range(3):
-        reach = half_a[0] * x[k] + half_a[1] * y[k] + half_a[2] * z[k]
-        out = max(0.0, abs(off[k]) - reach - half_b[k])
-        square += out * out
+        reach = half_i[k] + half_j[0] * a[k] + half_j[1] * b[k] + half_j[2] * c[k]
+        gap = max(gap, abs(dot(axes_i[k], off)) - reach)
+    x = max(0.0, abs(dot(u, off)) - dot(a, half_i) - half_j[0])
+    y = max(0.0, abs(dot(v, off)) - dot(b, half_i) - half_j[1])
+    z = max(0.0, abs(dot(w, off)) - dot(c, half_i) - half_j[2])
+    square = x * x + y * y + z * z
     return max(gap, math.sqrt(square))
 
 
 @jitable
-def ways_between(a: F1, b: F1, ways: int, pose: F1) -> int:
-    """Return which of `ways` nodes a (of I) and b (of J) have room for, seen along all their axes.
+def boxes_meet(
+    off: V3, axes_i: Axes, axes_j: Axes, half_i: V3, half_j: V3, turns: tuple[V3, V3, V3]
+) -> bool:
+    """Return whether two boxes have room in common, seen along all their axes.
 
-    `I_IN_J` is for a's triangles in b's layer, `J_IN_I` for b's triangles in a's layer.
+    `off` is the way from J's centre to I's, `turns` are the cosines of J's axes with those of I.
     """
-    x, y, z = turn(pose, vector(a)), turn(pose, vector(a[3:])), turn(pose, vector(a[6:]))
-    thin, deep = (a[THIN + 3], a[THIN + 4], a[THIN + 5]), (a[DEEP + 3], a[DEEP + 4], a[DEEP + 5])
-    half_thin, half_deep = vector(b[THIN + 3 :]), vector(b[DEEP + 3 :])
-    flush_in = FLUSH * (thin[0] + thin[1] + thin[2] + half_deep[0] + half_deep[1] + half_deep[2])
-    flush_out = FLUSH * (deep[0] + deep[1] + deep[2] + half_thin[0] + half_thin[1] + half_thin[2])
-    off_in = sub(place(pose, vector(a[THIN:])), vector(b[DEEP:]))
-    off_out = sub(place(pose, vector(a[DEEP:])), vector(b[THIN:]))
-    # how far out of the boxes of a those of b reach, along the axes of a
-    reach_in, reach_out = (-flush_in, -flush_in, -flush_in), (-flush_out, -flush_out, -flush_out)
-    for k in range(3):
-        u = vector(b[3 * k :])
-        c = (abs(dot(u, x)), abs(dot(u, y)), abs(dot(u, z)))
-        if ways & I_IN_J and abs(dot(u, off_in)) >= dot(c, thin) + half_deep[k] - flush_in:
-            ways -= I_IN_J
-        if ways & J_IN_I and abs(dot(u, off_out)) >= dot(c, deep) + half_thin[k] - flush_out:
-            ways -= J_IN_I
-        if ways == 0:
-            return 0
-        reach_in = add(reach_in, scale(half_deep[k], c))
-        reach_out = add(reach_out, scale(half_thin[k], c))
-    if ways & I_IN_J and (
-        abs(dot(x, off_in)) >= thin[0] + reach_in[0]
-        or abs(dot(y, off_in)) >= thin[1] + reach_in[1]
-        or abs(dot(z, off_in)) >= thin[2] + reach_in[2]
-    ):
-        ways -= I_IN_J
-    if ways & J_IN_I and (
-        abs(dot(x, off_out)) >= deep[0] + reach_out[0]
-        or abs(dot(y, off_out)) >= deep[1] + reach_out[1]
-        or abs(dot(z, off_out)) >= deep[2] + reach_out[2]
-    ):
-        ways -= J_IN_I
-    return ways
+    x, y, z = axes_i
+    u, v, w = axes_j
+    a, b, c = turns
+    flush = FLUSH * (half_i[0] + half_i[1] + half_i[2] + half_j[0] + half_j[1] + half_j[2])
+    # all are found before any is asked: which of them parts two boxes is not to be foreseen
+    gap = max(
+        abs(dot(u, off)) - (dot(a, half_i) + half_j[0]),
+        abs(dot(v, off)) - (dot(b, half_i) + half_j[1]),
+        abs(dot(w, off)) - (dot(c, half_i) + half_j[2]),
+        abs(dot(x, off)) - (half_i[0] + (half_j[0] * a[0] + half_j[1] * b[0] + half_j[2] * c[0])),
+        abs(dot(y, off)) - (half_i[1] + (half_j[0] * a[1] + half_j[1] * b[1] + half_j[2] * c[1])),
+        abs(dot(z, off)) - (half_i[2] + (half_j[0] * a[2] + half_j[1] * b[2] + half_j[2] * c[2])),
+    )
+    return gap < -flush
+
+
+@jitable
+def ways_between(mesh_i: F1, i: int, mesh_j: F1, j: int, ways: int, pose: F1) -> int:
+    """Return which of `ways` the nodes at i (of I) and j (of J) have room for.
+
+    `I_IN_J` is for I's triangles in J's layer, `J_IN_I` for J's triangles in I's layer.
+    """
+    axes_i, axes_j = turned_axes(mesh_i, i, pose), axes_of(mesh_j, j)
+    turns = (
+        cosines(axes_j[0], axes_i),
+        cosines(axes_j[1], axes_i),
+        cosines(axes_j[2], axes_i),
+    )
+    found = 0
+    if ways & I_IN_J:
+        off = offset(mesh_i, i + THIN, mesh_j, j + DEEP, pose)
+        thin, deep = vector(mesh_i, i + THIN + 3), vector(mesh_j, j + DEEP + 3)
+        if boxes_meet(off, axes_i, axes_j, thin, deep, turns):
+            found += I_IN_J
+    if ways & J_IN_I:
+        off = offset(mesh_i, i + DEEP, mesh_j, j + THIN, pose)
+        deep, thin = vector(mesh_i, i + DEEP + 3), vector(mesh_j, j + THIN + 3)
+        if boxes_meet(off, axes_i, axes_j, deep, thin, turns):
+            found += J_IN_I
+    return found

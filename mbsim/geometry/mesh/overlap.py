@@ -18,7 +18,7 @@ from mbsim.geometry.mesh.oriented import (
     I_IN_J,
     J_IN_I,
     extent,
-    node_of,
+    node_at,
     place,
     turn,
     ways_between,
@@ -80,7 +80,7 @@ def place_triangle(mesh: F1, t: int, pose: F1, moves: bool, origin: V3, prism: F
     """Write corners, inner points, depths and order of a triangle in J's axes from `origin`."""
     at = int(mesh[AT_TRIANGLES]) + TRIANGLE * t
     for k in range(0, DEPTH, 3):
-        p = vector(mesh[at + k :])
+        p = vector(mesh, at + k)
         if moves:
             p = (
                 pose[0] + pose[3] * p[0] + pose[4] * p[1] + pose[5] * p[2],
@@ -95,25 +95,25 @@ def place_triangle(mesh: F1, t: int, pose: F1, moves: bool, origin: V3, prism: F
 @jitable
 def corners_of(prism: F1, at: int) -> tuple[V3, V3, V3]:
     """Return the corners of a placed triangle, or its inner points."""
-    return (vector(prism[at:]), vector(prism[at + 3 :]), vector(prism[at + 6 :]))
+    return (vector(prism, at), vector(prism, at + 3), vector(prism, at + 6))
 
 
 @jitable
-def place_boxes(node: F1, pose: F1, moves: bool, origin: V3, boxes: F2) -> None:
+def place_boxes(mesh: F1, node: int, pose: F1, moves: bool, origin: V3, boxes: F2) -> None:
     """Write both boxes of a node in J's axes from `origin`: centre, axes by rows, half edges."""
     for k in range(2):
-        at, box = THIN + (DEEP - THIN) * k, boxes[k]
-        c = vector(node[at:])
+        at, box = node + THIN + (DEEP - THIN) * k, boxes[k]
+        c = vector(mesh, at)
         c = sub(place(pose, c) if moves else c, origin)
         box[0], box[1], box[2] = c[0], c[1], c[2]
         # what is flush with a side of a box is outside of it
-        flush = FLUSH * (node[at + 3] + node[at + 4] + node[at + 5])
+        flush = FLUSH * (mesh[at + 3] + mesh[at + 4] + mesh[at + 5])
         for r in range(3):
-            u = vector(node[3 * r :])
+            u = vector(mesh, node + 3 * r)
             if moves:
                 u = turn(pose, u)
             box[3 + 3 * r], box[4 + 3 * r], box[5 + 3 * r] = u[0], u[1], u[2]
-            box[12 + r] = node[at + 3 + r] - flush
+            box[12 + r] = mesh[at + 3 + r] - flush
 
 
 @jitable
@@ -121,9 +121,9 @@ def reaches(prism: F1, points: int, box: F1) -> bool:
     """Return whether a placed triangle (3 points), or its prism (6), reaches into a placed box."""
     c = vector(box)
     for r in range(3):
-        u, least, most = vector(box[3 + 3 * r :]), math.inf, -math.inf
+        u, least, most = vector(box, 3 + 3 * r), math.inf, -math.inf
         for k in range(0, 3 * points, 3):
-            height = dot(u, sub(vector(prism[k:]), c))
+            height = dot(u, sub(vector(prism, k), c))
             least, most = min(least, height), max(most, height)
         if least >= box[12 + r] or most <= -box[12 + r]:
             return False
@@ -133,7 +133,7 @@ def reaches(prism: F1, points: int, box: F1) -> bool:
 @jitable
 def place_leaf(
     mesh: F1,
-    node: F1,
+    node: int,
     pose: F1,
     moves: bool,
     origin: V3,
@@ -147,8 +147,8 @@ def place_leaf(
     `boxes` are those of the other leaf.
     """
     thin, deep = (I_IN_J, J_IN_I) if moves else (J_IN_I, I_IN_J)
-    first = int(node[FIRST])
-    for t in range(first, int(node[LAST])):
+    first = int(mesh[node + FIRST])
+    for t in range(first, int(mesh[node + LAST])):
         prism = placed[t - first]
         place_triangle(mesh, t, pose, moves, origin, prism)
         kept[t - first] = 0
@@ -206,24 +206,24 @@ def nodes_of(mesh_i: F1, mesh_j: F1, pose: F1, origin: V3) -> tuple[int, F2, F2,
     while many > 0:
         many -= 1
         i, j, ways = waiting[many, 0], waiting[many, 1], waiting[many, 2]
-        box_i, box_j = node_of(mesh_i, i), node_of(mesh_j, j)
-        ways = ways_between(box_i, box_j, ways, pose)
+        box_i, box_j = node_at(mesh_i, i), node_at(mesh_j, j)
+        ways = ways_between(mesh_i, box_i, mesh_j, box_j, ways, pose)
         if ways == 0:
             continue
-        first_i, last_i = int(box_i[FIRST]), int(box_i[LAST])
-        first_j, last_j = int(box_j[FIRST]), int(box_j[LAST])
+        first_i, last_i = int(mesh_i[box_i + FIRST]), int(mesh_i[box_i + LAST])
+        first_j, last_j = int(mesh_j[box_j + FIRST]), int(mesh_j[box_j + LAST])
         ends_i = i >= leaves_i or last_i - first_i <= FEW
         ends_j = j >= leaves_j or last_j - first_j <= FEW
         if not (ends_i and ends_j):
-            of_i = not ends_i and (ends_j or extent(box_i) > extent(box_j))
+            of_i = not ends_i and (ends_j or extent(mesh_i, box_i) > extent(mesh_j, box_j))
             for k in range(2):
                 waiting[many, 0], waiting[many, 1] = (2 * i + k, j) if of_i else (i, 2 * j + k)
                 waiting[many, 2] = ways
                 many += 1
             continue
-        place_boxes(box_j, pose, False, origin, boxes)
+        place_boxes(mesh_j, box_j, pose, False, origin, boxes)
         place_leaf(mesh_i, box_i, pose, True, origin, ways, boxes, placed_i, kept_i)
-        place_boxes(box_i, pose, True, origin, boxes)
+        place_boxes(mesh_i, box_i, pose, True, origin, boxes)
         place_leaf(mesh_j, box_j, pose, False, origin, ways, boxes, placed_j, kept_j)
         for a in range(first_i, last_i):
             for b in range(first_j, last_j):
@@ -256,6 +256,41 @@ def place_in(table: I1, pairs: F2, a: int, b: int) -> int:
 
 
 @jitable
+def edge_towards(beside: F1, at: int, other: int) -> int:
+    """Return the edge of a triangle, whose neighbours' numbers begin at `at`, towards a neighbour.
+
+    0 where it is none.
+    """
+    for e in range(3):
+        if int(beside[at + e]) == other:
+            return e
+    return 0
+
+
+@jitable
+def across_both(mesh_i: F1, mesh_j: F1, table: I1, pairs: F2, values: F2, k: int, e: int) -> int:
+    """Return the node beyond edge e of pair k where that lies on an edge of the other triangle.
+
+    Then the neighbour there has no piece with that triangle, but with one of its neighbours, and
+    psi on the same edge. -1 for none.
+    """
+    a, b, of_i = int(pairs[k, 0]), int(pairs[k, 1]), e < 3
+    here, mesh = (a, mesh_i) if of_i else (b, mesh_j)
+    at_i = int(mesh_i[AT_TRIANGLES]) + TRIANGLE * a + BESIDE
+    at_j = int(mesh_j[AT_TRIANGLES]) + TRIANGLE * b + BESIDE
+    beyond = int(mesh_i[at_i + e]) if of_i else int(mesh_j[at_j + e - 3])
+    back = edge_towards(mesh, int(mesh[AT_TRIANGLES]) + TRIANGLE * beyond + BESIDE, here)
+    for f in range(3):
+        if of_i:
+            m = table[place_in(table, pairs, beyond, int(mesh_j[at_j + f]))]
+        else:
+            m = table[place_in(table, pairs, int(mesh_i[at_i + f]), beyond)]
+        if m >= 0 and values[m, back if of_i else 3 + back] > 0.0:
+            return m
+    return -1
+
+
+@jitable
 def partners_of(mesh_i: F1, mesh_j: F1, count: int, values: F2, pairs: F2) -> I2:
     """Return the nodes beyond the six edges of each pair of triangles, -1 for none."""
     size = 16
@@ -274,4 +309,7 @@ def partners_of(mesh_i: F1, mesh_j: F1, count: int, values: F2, pairs: F2) -> I2
                 partners[k, e] = table[place_in(table, pairs, int(mesh_i[beside_i + e]), b)]
             if values[k, 3 + e] > 0.0:
                 partners[k, 3 + e] = table[place_in(table, pairs, a, int(mesh_j[beside_j + e]))]
+        for e in range(EDGES):
+            if values[k, e] > 0.0 and partners[k, e] < 0:
+                partners[k, e] = across_both(mesh_i, mesh_j, table, pairs, values, k, e)
     return partners

@@ -60,7 +60,7 @@ def lowest_corner(mesh: F1, n: V3) -> tuple[float, V3]:
         first, last = leaf_range(mesh, node)
         for t in range(first, last):
             for k in range(3):
-                p = vector(mesh[triangles + TRIANGLE * t + 3 * k :])
+                p = vector(mesh, triangles + TRIANGLE * t + 3 * k)
                 height = dot(p, n)
                 if height < best:
                     best, corner = height, p
@@ -85,7 +85,7 @@ def triangles_below(mesh: F1, n: V3, height: float, found: I1) -> int:
         first, last = leaf_range(mesh, node)
         for t in range(first, last):
             at = triangles + TRIANGLE * t
-            a, b, c = vector(mesh[at:]), vector(mesh[at + 3 :]), vector(mesh[at + 6 :])
+            a, b, c = vector(mesh, at), vector(mesh, at + 3), vector(mesh, at + 6)
             if min(dot(a, n), dot(b, n), dot(c, n)) < height:
                 found[many] = t
                 many += 1
@@ -101,7 +101,7 @@ def measure_below(
     `work` holds two polygons and the sums.
     """
     at = int(mesh[AT_TRIANGLES]) + TRIANGLE * t
-    a, b, c = vector(mesh[at:]), vector(mesh[at + 3 :]), vector(mesh[at + 6 :])
+    a, b, c = vector(mesh, at), vector(mesh, at + 3), vector(mesh, at + 6)
     here = height - dot(a, n)
     depth = (here, height - dot(b, n) - here, height - dot(c, n) - here)
     deep = (here, here + depth[1], here + depth[2])
@@ -116,7 +116,7 @@ def measure_below(
     e1, e2 = sub(b, a), sub(c, a)
     add_piece(node, sums, sub(a, origin), e1, e2, scale(-1.0, n), 1.0, 1.0)
     # along the plane's normal alone the centre of pressure is that of the overlap, to the last bit
-    pressure = dot(vector(node[PUSH:]), n)
+    pressure = dot(vector(node, PUSH), n)
     part = pressure / node[PRESSURE] if node[PRESSURE] > 0.0 else 0.0
     node[PRESSURE] = node[VOLUME] = pressure
     for k in range(6):
@@ -124,7 +124,7 @@ def measure_below(
     for k in range(3):
         node[MOMENT + k] *= part
         node[PUSH + k] = pressure * n[k]
-    twist = cross(vector(node[MOMENT:]), n)
+    twist = cross(vector(node, MOMENT), n)
     for k in range(3):
         node[TWIST + k] = twist[k]
 

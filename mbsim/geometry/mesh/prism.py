@@ -125,9 +125,9 @@ def piece_in_prism(
     origin, as `tri`.
     """
     i, j, k = int(prism[ORDER]), int(prism[ORDER + 1]), int(prism[ORDER + 2])
-    a, b, c = vector(prism[3 * i :]), vector(prism[3 * j :]), vector(prism[3 * k :])
-    x = vector(prism[INNER + 3 * i :])
-    y, z = vector(prism[INNER + 3 * j :]), vector(prism[INNER + 3 * k :])
+    a, b, c = vector(prism, 3 * i), vector(prism, 3 * j), vector(prism, 3 * k)
+    x = vector(prism, INNER + 3 * i)
+    y, z = vector(prism, INNER + 3 * j), vector(prism, INNER + 3 * k)
     da, db, dc = prism[DEPTH + i], prism[DEPTH + j], prism[DEPTH + k]
     ab, bc, ca = side_between(i, j), side_between(j, k), side_between(k, i)
     piece_in_tetrahedron(

@@ -126,9 +126,9 @@ def _direction(s: F1, a: int) -> V3:
     if a < 3:
         n = (1.0 if a == 0 else 0.0, 1.0 if a == 1 else 0.0, 1.0 if a == 2 else 0.0)
     elif a < 6:
-        n = vector(s[3 * (a - 3) :])
+        n = vector(s, 3 * (a - 3))
     else:
-        u, j = vector(s[3 * ((a - 6) // 3) :]), (a - 6) % 3
+        u, j = vector(s, 3 * ((a - 6) // 3)), (a - 6) % 3
         if j == 0:
             n = (0.0, u[2], -u[1])
         elif j == 1:
@@ -136,7 +136,7 @@ def _direction(s: F1, a: int) -> V3:
         else:
             n = (u[1], -u[0], 0.0)
         n = scale(1.0 / norm(n), n)
-    return n if dot(n, vector(s[_T:])) >= 0.0 else scale(-1.0, n)
+    return n if dot(n, vector(s, _T)) >= 0.0 else scale(-1.0, n)
 
 
 @jitable
@@ -245,9 +245,9 @@ def _manifold(
     A, B = hj[mj], hj[oj]
 
     ni = (
-        dot(vector(s[0:]), n),
-        dot(vector(s[3:]), n),
-        dot(vector(s[6:]), n),
+        dot(vector(s, 0), n),
+        dot(vector(s, 3), n),
+        dot(vector(s, 6), n),
     )
     ki = _steepest(ni[0], ni[1], ni[2])
     mi, oi = (ki + 1) % 3, (ki + 2) % 3

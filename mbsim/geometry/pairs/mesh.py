@@ -56,7 +56,7 @@ def _weights_of_patches(hull: F1, local: V3, points: F2) -> None:
         if points[row, AT_DEPTH] > points[deepest, AT_DEPTH]:
             deepest = row
     for f in range(int(hull[FACES])):
-        lies = step(-dot(vector(hull[planes + 4 * f :]), local), LEANS, 0.0, LIES, 1.0)
+        lies = step(-dot(vector(hull, planes + 4 * f), local), LEANS, 0.0, LIES, 1.0)
         if lies > 0.0:
             lies *= hull[int(hull[AT_SIDES]) + f]
             flat, total = max(flat, lies), total + lies
@@ -88,7 +88,7 @@ def mesh_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> 
         points[row, AT_DEPTH] = -math.inf
     for k in range(int(hull[CORNERS])):
         row = int(hull[data + 3 * k + 2])
-        depth = -height - dot(vector(hull[corners + 3 * k :]), local)
+        depth = -height - dot(vector(hull, corners + 3 * k), local)
         if depth > points[row, AT_DEPTH]:
             # remember which corner; its place follows once
             points[row, AT_DEPTH], points[row, 1] = depth, k
@@ -99,7 +99,7 @@ def mesh_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> 
             points[row, AT_WEIGHT] = hull[weights + row]
     for row in range(rows):
         depth, k = points[row, AT_DEPTH], int(points[row, 1])
-        p = add(vector(frame_i), to_global(frame_i, vector(hull[corners + 3 * k :])))
+        p = add(vector(frame_i), to_global(frame_i, vector(hull, corners + 3 * k)))
         put_point(points[row], depth, add(p, scale(0.5 * depth, n)), n, points[row, AT_WEIGHT])
         if points[row, AT_WEIGHT] <= LEAST_WEIGHT:
             # a point without force is none
@@ -171,8 +171,8 @@ def hull_cut(hull: F1, height: float, n: V3) -> float:
         first, last = int(hull[starts + f]), int(hull[starts + f + 1])
         for at in range(first, last):
             after = at + 1 if at + 1 < last else first
-            here = vector(hull[corners + 3 * int(hull[loops + 2 * at]) :])
-            there = vector(hull[corners + 3 * int(hull[loops + 2 * after]) :])
+            here = vector(hull, corners + 3 * int(hull[loops + 2 * at]))
+            there = vector(hull, corners + 3 * int(hull[loops + 2 * after]))
             low, high = height + dot(here, n), height + dot(there, n)
             if (low < 0.0) == (high < 0.0):
                 continue

@@ -65,7 +65,7 @@ def high_corner(hull: F1, n: V3) -> V3:
     """Return the corner that is highest along n."""
     at, best, found = int(hull[AT_CORNERS]), -math.inf, (0.0, 0.0, 0.0)
     for k in range(int(hull[CORNERS])):
-        p = vector(hull[at + 3 * k :])
+        p = vector(hull, at + 3 * k)
         if dot(p, n) > best:
             best, found = dot(p, n), p
     return found
@@ -83,7 +83,7 @@ def least_face(hull: F1, solid: Shape) -> tuple[float, V3, int]:
     """Return (f, n, face) of the least overlap along the normals of the mesh's faces."""
     least, found, at = math.inf, 0, int(hull[AT_PLANES])
     for face in range(int(hull[FACES])):
-        m = vector(hull[at + 4 * face :])
+        m = vector(hull, at + 4 * face)
         f = hull[at + 4 * face + 3] - dot(m, lowest(solid, m))
         if f < least:
             least, found = f, face

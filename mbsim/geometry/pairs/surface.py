@@ -145,7 +145,7 @@ def shell_within(mesh: F1, side: int, pairs: F2, other: F1, pose: F1) -> bool:
     at = int(mesh[AT_SHELLS])
     count = int(mesh[LENGTH]) - at - int(mesh[TRIANGLES])
     for shell in range(count):
-        p = vector(mesh[int(mesh[AT_TRIANGLES]) + TRIANGLE * int(mesh[at + shell]) :])
+        p = vector(mesh, int(mesh[AT_TRIANGLES]) + TRIANGLE * int(mesh[at + shell]))
         p = place(pose, p) if side == 0 else place_back(pose, p)
         inside = box_square(other, int(other[AT_BOXES]) + NODE, p) == 0.0
         for k in range(len(pairs)):
@@ -227,8 +227,8 @@ def sphere_surface(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2)
         least = row[0]
     for k in range(len(points)):
         at = rows[min(k, max(count - 1, 0))]
-        n = to_global(frame_j, vector(at[NEAR_NORMAL:]))
-        p = add(vector(frame_j), to_global(frame_j, vector(at[NEAR_POINT:])))
+        n = to_global(frame_j, vector(at, NEAR_NORMAL))
+        p = add(vector(frame_j), to_global(frame_j, vector(at, NEAR_POINT)))
         size = norm(n)
         depth = at[0] if k < count else least
         weight = at[NEAR_WEIGHT] if k < count else 1.0

@@ -151,6 +151,13 @@ def ratchet(figure: Figure) -> None:
     _panels(figure, _Scene("ratchet.xml", 0.0), (0.0, 0.2, 1.0), _view(-80.0, 60.0))
 
 
+@picture("scene-gears.svg", height=2.4)
+def gears(figure: Figure) -> None:
+    """The gears over one mesh cycle: from tooth to tooth of the first."""
+    scene = _Scene("gear_pair.xml", 0.0, end_time=0.01)
+    _panels(figure, scene, (0.0, 0.005, 0.01), _view(-90.0, 75.0))
+
+
 @picture("scene-bowl.svg", height=2.6)
 def bowl(figure: Figure) -> None:
     """Balls fall into the bowl."""
