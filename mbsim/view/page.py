@@ -8,7 +8,6 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from mbsim.errors import ResultsError
 from mbsim.results.units import POSITION, TIME
 from mbsim.view.packing import text_of
 from mbsim.view.run_data import ROOM, RunData, run_data
@@ -87,7 +86,7 @@ def page(
     connect : str
         From where the page may ask for more, as its security policy has it.
     """
-    return static("view.html").format(
+    text = static("view.html").format(
         title=escape(title),
         connect=connect,
         style=static("view.css"),
@@ -97,16 +96,14 @@ def page(
         library=library(),
         script=scripts() + _MOUNT,
     )
+    return readable(text)
+
+
+def readable(text: str) -> str:
+    """Return a text with bytes of file names that are no text as escapes."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def title_of(scenes: Sequence[Scene]) -> str:
     """Return what the page of these runs is called."""
     return " and ".join(scene.name for scene in scenes)
-
-
-def write(file: Path, text: str) -> None:
-    """Write a page; ResultsError where the file cannot be written."""
-    try:
-        file.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ResultsError(f"{file}: {error.strerror}") from None

@@ -7,12 +7,13 @@ import json
 from html import escape
 from pathlib import Path
 
+from mbsim.core.stored import read_regular
 from mbsim.errors import MbsimError
 from mbsim.model.elements import Model
 from mbsim.model.subroutines import wanted
 from mbsim.results.reading import Results
 from mbsim.view import report_parts as parts
-from mbsim.view.page import library, pack_elements, packs_of, scripts, static
+from mbsim.view.page import library, pack_elements, packs_of, readable, scripts, static
 from mbsim.view.scene import read_scene
 
 #: Longest text of a deck or script that a report quotes [characters].
@@ -40,7 +41,7 @@ def report(results: Results) -> str:
         ("Counters", parts.counters(results)),
         ("Deck and user files", _texts(results, model)),
     ]
-    return static("report.html").format(
+    text = static("report.html").format(
         title=escape(f"{name}: report"),
         name=escape(name),
         style=static("view.css") + static("report.css"),
@@ -55,6 +56,7 @@ def report(results: Results) -> str:
         library=library(),
         script=scripts() + static("report.js"),
     )
+    return readable(text)
 
 
 def _anchor(title: str) -> str:
@@ -81,7 +83,7 @@ def _deck(results: Results) -> tuple[Path, bytes | None, str]:
     """Return the deck's path, its bytes if it is the one that was run, and what to say else."""
     file = Path(str(results.attributes.get("model_file", "")))
     try:
-        data = file.read_bytes()
+        data = read_regular(file)
     except (OSError, ValueError) as error:
         return file, None, f"{file} cannot be read: {getattr(error, 'strerror', error)}"
     if hashlib.sha256(data).hexdigest() != results.attributes.get("model_sha256"):
@@ -125,7 +127,7 @@ def _texts(results: Results, model: Model | None) -> str:
         found.append(_quoted(file, data, "as it was run"))
     for script in _scripts(results, model):
         try:
-            data = script.read_bytes()
+            data = read_regular(script)
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", error)
             found.append(f'<p class="note">{escape(f"{script} cannot be read: {reason}")}</p>')
