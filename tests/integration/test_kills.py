@@ -50,6 +50,8 @@ class Straight:
         self.whole = self._timed()
         with open_results(next(self.out.glob("*.h5"))) as results:
             compiled = results.stats["compile_s"]
+            #: Seconds of its loop alone.
+            self.loop = results.stats["loop_s"]
             size = sum(results[name].nbytes for name in results.signals())
         #: How many writes there are until a run is killed; of a long one blocks are on their way.
         self.writes = [20, 40] + [150, 300, 600, 1200] * (size > 2 * BUFFER_BYTES)
@@ -172,10 +174,8 @@ def test_a_stopped_run_goes_on_bit_for_bit(
         number = chance.choice([signal.SIGTERM] * 4 + [signal.SIGHUP, signal.SIGINT])
         # of most runs once they have begun: the folder tried, locked, and a part file made
         changes = Changes(out, with_bytes=False) if LINUX and chance.random() < 0.9 else None
-        after, later = chance.uniform(0.0, 0.5) * whole.whole, chance.uniform(0.0, 0.6)
-        code, said = run_until(
-            whole.line(out), after, number, changes, at=4, later=later * whole.whole
-        )
+        after, later = chance.uniform(0.0, 0.5) * whole.whole, chance.uniform(0.0, 0.9) * whole.loop
+        code, said = run_until(whole.line(out), after, number, changes, at=4, later=later)
         if changes is not None:
             changes.close()
         codes.append(code)
