@@ -62,12 +62,10 @@ def run_until(
     number: int = signal.SIGKILL,
     changes: Changes | None = None,
     at: int | None = None,
-    later: float = 0.0,
 ) -> tuple[int, str]:
     """Run a command, sent a signal in time; return its code and messages.
 
-    The time is `after` so many seconds, of `changes` at so many and so much `later`, or so long
-    after the first result.
+    The time is `after` so many seconds, of `changes` at so many, or so long after the first result.
     """
     with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
         while changes is not None and process.poll() is None:
@@ -76,7 +74,7 @@ def run_until(
             changes.wait(0.2)
         try:
             soon = changes is not None and at is not None and process.poll() is None
-            _, said = process.communicate(timeout=later if soon else after)
+            _, said = process.communicate(timeout=0.0 if soon else after)
         except subprocess.TimeoutExpired:
             process.send_signal(number)
             _, said = process.communicate(timeout=900.0)
