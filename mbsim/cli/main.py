@@ -20,6 +20,7 @@ from mbsim.errors import DeckError, Interrupted, MbsimError, ModelError, Results
 
 #: Subcommand -> module; each module has a click command named `command`.
 COMMANDS = {
+    "new": "mbsim.cli.new",
     "run": "mbsim.cli.run",
     "check": "mbsim.cli.check",
     "info": "mbsim.cli.info",
