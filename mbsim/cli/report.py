@@ -23,20 +23,24 @@ def command(file: Path, output: Path | None) -> None:
 
     It needs no other file and no network, and prints well.
     """
+    from mbsim.results.products import said_size
+
     target = output or Path(f"{file.stem}-report.html")
     write_report(file, target)
-    echo(f"{target}: {target.stat().st_size / 1e6:.2f} MB")
+    echo(f"{target}: {said_size(target)}")
 
 
 def write_report(file: Path, target: Path) -> None:
     """Write the report of a result file."""
     from mbsim.results.opening import read_apart
+    from mbsim.results.products import check_product, write_product
     from mbsim.results.reading import open_results
-    from mbsim.view.page import write
     from mbsim.view.report import report
+
+    check_product(target, "page")
 
     def read() -> str:
         with open_results(file) as results:
             return report(results)
 
-    write(target, read_apart(read, file))
+    write_product(target, read_apart(read, file), "page")

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 #: Largest side of a picture [pixels].
 _LARGEST = 8192
+#: What --gltf writes.
+_GLTF = "glTF model", "--gltf"
 
 
 @click.command("view")
@@ -127,44 +129,49 @@ class _Asked:
         from mbsim.errors import ModelError
         from mbsim.results.curves import names_of
         from mbsim.results.opening import read_apart
+        from mbsim.results.products import check_product, said_size, write_product
         from mbsim.view.pictures import check_tools, make
 
         pictures = {"png": self.png, "gif": self.gif, "mp4": self.mp4}
         check_tools(**pictures)
         if self.gltf is not None and len(self.files) > 1:
             raise ModelError("--gltf takes one result file")
-        text, packs = read_apart(self._read, *self.files)
+        page = self.output
+        if page is None and not any((*pictures.values(), self.gltf)):
+            page = Path("-over-".join(names_of(list(self.files))) + ".html")
+        if page is not None:
+            check_product(page, "page")
+        if self.gltf is not None:
+            check_product(self.gltf, *_GLTF)
+        text, packs, model = read_apart(self._read, *self.files)
         warn(line for pack in packs for line in pack.warnings)
         if self.gltf is not None:
-            echo(f"{self.gltf}: {self.gltf.stat().st_size / 1e6:.2f} MB")
+            write_product(self.gltf, model, *_GLTF)
+            echo(f"{self.gltf}: {said_size(self.gltf)}")
         if any(pictures.values()):
             time, speed = self.rest["time"], self.rest["speed"]
             make(text, self.size, **pictures, time=time, speed=speed)  # type: ignore[arg-type]
             for file in filter(None, pictures.values()):
-                echo(f"{file}: {file.stat().st_size / 1e6:.2f} MB")
-        if self.output is not None or not any((*pictures.values(), self.gltf)):
-            from mbsim.view.page import write
+                echo(f"{file}: {said_size(file)}")
+        if page is not None:
+            write_product(page, text, "page")
+            echo(f"{page}: {_rows(packs)}, {said_size(page)}")
 
-            target = self.output or Path("-over-".join(names_of(list(self.files))) + ".html")
-            write(target, text)
-            echo(f"{target}: {_rows(packs)}, {target.stat().st_size / 1e6:.2f} MB")
-
-    def _read(self) -> tuple[str, list[RunData]]:
-        """Return the page and its packs; write the glTF, which needs the numbers as well."""
+    def _read(self) -> tuple[str, list[RunData], bytes]:
+        """Return the page, its packs, and the glTF model where one is asked for."""
         from mbsim.results.reading import open_results
-        from mbsim.view.gltf import write_glb
+        from mbsim.view.gltf import glb
         from mbsim.view.page import factors, packs_of, page, title_of
         from mbsim.view.scene import read_scene
 
         with ExitStack() as stack:
             scenes = [read_scene(stack.enter_context(open_results(file))) for file in self.files]
-            if self.gltf is not None:
-                write_glb(scenes[0], self.gltf)
+            model = glb(scenes[0]) if self.gltf is not None else b""
             packs = packs_of(scenes, self.signals)
             settings = {"factors": factors(scenes), "signals": list(self.signals)}
             if self.rest["theme"]:
                 settings["theme"] = self.rest["theme"]
-            return page(title_of(scenes), settings, packs), packs
+            return page(title_of(scenes), settings, packs), packs, model
 
 
 def _rows(packs: Sequence[RunData]) -> str:

@@ -48,9 +48,14 @@ def command(
     if target is not None and output is not None:
         _ship(target, output, [*models, *(["--all"] if everything else [])])
         return
-    from mbsim.core import jit
+    from mbsim.core import code_cache, jit
+    from mbsim.errors import ResultsError
     from mbsim.warming.tasks import refused, tasks
 
+    nothing_kept = ResultsError(f"{code_cache.cache_root()}: compiled code cannot be kept there")
+    code_cache.trusted_root()
+    if not code_cache.is_kept():
+        raise nothing_kept  # now, not after minutes
     began = time.perf_counter()
     before = jit.total
     todo = tasks(everything, models)
@@ -65,6 +70,8 @@ def command(
         from mbsim.errors import ModelError
 
         raise ModelError("nothing of it could be run")
+    if not code_cache.is_kept():
+        raise nothing_kept
 
 
 def _do_all(todo: Sequence[Task], refused: Callable[[Task], str]) -> list[str]:
@@ -106,9 +113,13 @@ def _ship(family: str, output: Path, arguments: list[str]) -> None:
     Numba asks for the processor once, when it is imported.
     """
     from mbsim.core import processors
-    from mbsim.errors import MbsimError
+    from mbsim.errors import MbsimError, ResultsError
 
     folder = output / processors.folder_of(family)
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError as error:
+        raise ResultsError(f"{folder}: cannot be made: {error.strerror}") from None
     environment = {
         **os.environ,
         **processors.settings(family),

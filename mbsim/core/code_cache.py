@@ -76,6 +76,11 @@ def _note_unkept(folder: Path, error: OSError) -> None:
         on_unkept(f"{folder}: compiled code is not kept for later runs: {error.strerror or error}")
 
 
+def is_kept() -> bool:
+    """Return whether all code that was compiled by now is kept for later runs."""
+    return not _unkept
+
+
 @functools.cache
 def trusted_root() -> Path:
     """Return `cache_root()`, made for the user alone if it is not there.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 from mbsim.forces.catalog import FORCES
 
 #: Adams' statements by the XML's.
@@ -52,11 +54,13 @@ def element_name(file: str, statement: str, id: int) -> str:
     return f"{name}/{id}" if is_adams(file) else f"{name}[{id}]"
 
 
+@functools.cache
 def is_adams(file: str) -> bool:
     """Return whether a deck is one of Adams, by its name."""
     return file.lower().endswith(".adm") or is_commands(file)
 
 
+@functools.cache
 def is_commands(file: str) -> bool:
     """Return whether a file holds Adams' commands, by its name."""
     return file.lower().endswith(".acf")

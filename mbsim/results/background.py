@@ -43,3 +43,8 @@ class Background:
         failure, self._failure = self._failure, None
         if failure is not None:
             raise failure
+
+    def check(self) -> None:
+        """Raise what the last piece of work raised, once; what is being done goes on."""
+        if self._failure is not None:
+            self.wait()

@@ -88,10 +88,12 @@ class Gathered:
         added = []
         for name, first in self._ends.items():
             end = first + counts.get(name, rows)
-            self._make_room(name, end)
+            if end > first:
+                self._make_room(name, end)
+                self._ends[name] = end
             table = self._tables[name]
-            table[first:end] = getattr(self._system.scene.rows, name)[: end - first]
-            self._ends[name] = end
+            if end > first and self._widths[name]:
+                table[first:end] = getattr(self._system.scene.rows, name)[: end - first]
             added.append(table[first:end])
         return Block(*added)
 

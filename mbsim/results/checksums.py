@@ -41,10 +41,12 @@ def sums_of(data: Any) -> array[int]:
     return array("I", [crc(view[at : at + BLOCK]) for at in range(0, len(view), BLOCK)])
 
 
-def end_of(sums: array[int], size: int) -> bytes:
+def end_of(sums: array[int], size: int) -> bytearray:
     """Return what follows a file's `size` bytes, whose blocks have those checksums."""
-    table = _little(sums).tobytes() + struct.pack("<Q", size)
-    return table + struct.pack("<I8s", zlib.crc32(table), MAGIC)
+    made = bytearray(_little(sums))
+    made += struct.pack("<Q", size)
+    made += struct.pack("<I8s", zlib.crc32(made), MAGIC)
+    return made
 
 
 def sums_at_end(handle: int) -> tuple[array[int], int] | None:
@@ -90,17 +92,16 @@ def _pread(handle: int, size: int, at: int) -> bytes:
     return os.read(handle, size)
 
 
-def renewed(handle: int, sums: array[int], ranges: list[list[int]], size: int) -> array[int]:
-    """Return the checksums of an open file of which those ranges were written since `sums`."""
+def renew(handle: int, sums: array[int], ranges: list[list[int]], size: int) -> None:
+    """Make checksums those of an open file of which those ranges were written since."""
     count = -(-size // BLOCK)
-    found = sums[:count]
-    found.extend(bytes(count - len(found)))
+    del sums[count:]
+    sums.extend(bytes(count - len(sums)))
     for first, end in ranges:
         for at in range(first // BLOCK * BLOCK, min(end, size), _PIECE):
             until = min(at + _PIECE, -(-min(end, size) // BLOCK) * BLOCK, size)
             part = sums_of(_pread(handle, until - at, at))
-            found[at // BLOCK : at // BLOCK + len(part)] = part
-    return found
+            sums[at // BLOCK : at // BLOCK + len(part)] = part
 
 
 class CheckedFile:

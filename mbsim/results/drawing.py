@@ -6,8 +6,8 @@ Figures are made without pyplot: no window, no global state, no backend to choos
 from __future__ import annotations
 
 import contextlib
+import io
 import math
-import os
 import textwrap
 import warnings
 from collections.abc import Iterator, Sequence
@@ -16,10 +16,9 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from mbsim.core.stored import read_regular
-from mbsim.errors import ModelError, ResultsError
+from mbsim.errors import ModelError
 from mbsim.results.curves import Curve, Panel, Picture, components
-from mbsim.results.files import sync
+from mbsim.results.products import check_product, write_product
 from mbsim.results.quantities import quantity_of
 from mbsim.results.units import INCIDENTS, TIME, UnitSystem
 
@@ -380,20 +379,13 @@ def save(figure: Figure, path: Path) -> list[str]:
         If the file cannot be written.
     """
     check_target(path)
-    temporary = path.with_name(f".{path.name}.tmp")
+    made = io.BytesIO()
     # a date would make two equal pictures differ
     facts: dict[str, Any] = {"Date": None} if path.suffix.lower() == ".svg" else {}
-    try:
-        with _style(), warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            figure.savefig(temporary, format=path.suffix.lower()[1:], metadata=facts)
-        sync(temporary)
-        os.replace(temporary, path)
-    except OSError as error:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
-        reason = error.strerror or str(error)
-        raise ResultsError(f"{path}: the picture cannot be written: {reason}") from None
+    with _style(), warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        figure.savefig(made, format=path.suffix.lower()[1:], metadata=facts)
+    write_product(path, made.getvalue(), "picture")
     said = [str(warning.message) for warning in caught]
     if any("Glyph" in text for text in said):
         return ["the font of the picture lacks letters of some labels"]
@@ -404,16 +396,4 @@ def check_target(path: Path) -> None:
     """Raise `ModelError` unless a picture may be written there."""
     if path.suffix.lower() not in SUFFIXES:
         raise ModelError(f"-o {path}: the name must end in {' or '.join(SUFFIXES)}")
-    if path.is_dir():
-        raise ModelError(f"-o {path}: is a folder; give a file in it")
-    if path.exists() and not is_picture(path):
-        raise ModelError(f"-o {path}: is there and is no picture; it is left alone")
-
-
-def is_picture(path: Path) -> bool:
-    """Return whether a file is a PNG or SVG, by what it holds; an empty one may be replaced."""
-    try:
-        head = read_regular(path, 4096)
-    except OSError as error:
-        raise ResultsError(f"{path}: cannot be read: {error.strerror}") from None
-    return not head or head.startswith(b"\x89PNG\r\n\x1a\n") or b"<svg" in head
+    check_product(path, "picture")

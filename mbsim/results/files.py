@@ -12,12 +12,12 @@ SUFFIXES = (".h5", ".csv", ".log")
 _LOCK_FLAGS = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
 
 
-def problem(path: Path, error: BaseException) -> ResultsError:
+def problem(path: Path, error: BaseException, what: str = "results") -> ResultsError:
     """Return what went wrong with a result file, in one line."""
     reason = getattr(error, "strerror", None) or " ".join(str(error).split())
     if isinstance(error, MemoryError):
         reason = "there is not enough memory"
-    return ResultsError(f"{path}: results cannot be written: {reason or type(error).__name__}")
+    return ResultsError(f"{path}: {what} cannot be written: {reason or type(error).__name__}")
 
 
 def create(path: Path) -> int:
@@ -144,15 +144,24 @@ def replace_text(path: Path, text: str) -> None:
     ResultsError
         If the disk is full, or the folder is gone or protected.
     """
+    replace_bytes(path, text.encode("utf-8", "backslashreplace"))
+
+
+def replace_bytes(path: Path, data: bytes, what: str = "results") -> None:
+    """Write a file such that `path` holds the old or the new bytes, never a part.
+
+    Raises
+    ------
+    ResultsError
+        If the disk is full, or the folder is gone or protected; `what` is in its message.
+    """
     temporary = path.with_name(f".{path.name}.tmp")
     try:
-        with os.fdopen(
-            create(temporary), "w", encoding="utf-8", errors="backslashreplace", newline="\n"
-        ) as file:
-            file.write(text)
+        with os.fdopen(create(temporary), "wb") as file:
+            file.write(data)
         sync(temporary)
         os.replace(temporary, path)
     except OSError as error:
         with contextlib.suppress(OSError):
             temporary.unlink()
-        raise problem(path, error) from None
+        raise problem(path, error, what) from None

@@ -13,7 +13,7 @@ import hashlib
 import json
 import re
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -83,36 +83,63 @@ def plain(value: Any) -> Any:
     Left out are file and line of an element and fields marked ASIDE. Arrays become digests,
     expressions their text: a tree may be deeper than JSON goes.
     """
-    if type(value) in _PLAIN or isinstance(value, bool | int | float | str):
+    kind: Any = type(value)
+    if kind in _PLAIN:
         return value
-    if isinstance(value, Expression):
-        return value.text
-    if isinstance(value, np.ndarray):
-        data = np.ascontiguousarray(value)
-        return f"{'x'.join(map(str, data.shape))} {hashlib.sha256(data.tobytes()).hexdigest()}"
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, list | tuple):
-        if _PLAIN.issuperset(map(type, value)):
-            return list(value)
-        named = all(isinstance(item, tuple) and len(item) == 2 for item in value)
-        if named and all(isinstance(item[0], str) for item in value):
-            return {name: plain(item) for name, item in value}
-        return [plain(item) for item in value]
-    if not is_dataclass(value):
-        raise TypeError(f"{type(value).__name__} is nothing that a run can be compared by")
+    return _forms(kind)(value)
+
+
+@functools.cache
+def _forms(kind: Any) -> Callable[[Any], Any]:
+    """Return what makes values of a type plain."""
+    for types, form in _FORMS:
+        if issubclass(kind, types):
+            return form
+    if not is_dataclass(kind):
+        raise TypeError(f"{kind.__name__} is nothing that a run can be compared by")
+    return _element
+
+
+def _element(value: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass that are no defaults."""
     made = {"": type(value).__name__}
     kind: Any = type(value)
     for name, default, shown in _defaults(kind):
         item = getattr(value, name)
         if item is default or isinstance(item, Source):
             continue
-        known = plain(item)
-        if repr(known) != shown:
+        known = item if type(item) in _PLAIN else plain(item)
+        # of all elements a text is long
+        if not shown or repr(known) != shown:
             made[name] = known
     return made
+
+
+def _array(value: np.ndarray[Any, Any]) -> str:
+    """Return shape and digest of an array."""
+    data = np.ascontiguousarray(value)
+    return f"{'x'.join(map(str, data.shape))} {hashlib.sha256(data.tobytes()).hexdigest()}"
+
+
+def _sequence(value: Sequence[Any]) -> Any:
+    """Return a list; of pairs of a name and a value a mapping."""
+    if _PLAIN.issuperset(map(type, value)):
+        return list(value)
+    named = all(isinstance(item, tuple) and len(item) == 2 for item in value)
+    if named and all(isinstance(item[0], str) for item in value):
+        return {name: plain(item) for name, item in value}
+    return [plain(item) for item in value]
+
+
+#: What makes values plain, by their types; the first that fits counts.
+_FORMS: tuple[tuple[Any, Callable[[Any], Any]], ...] = (
+    ((bool, int, float, str), lambda value: value),
+    (Expression, lambda value: value.text),
+    (np.ndarray, _array),
+    (Mapping, lambda value: {str(key): plain(item) for key, item in value.items()}),
+    (np.generic, lambda value: value.item()),
+    ((list, tuple), _sequence),
+)
 
 
 @functools.cache
@@ -234,17 +261,23 @@ class Identity:
         }
 
     @functools.cached_property
+    def _texts(self) -> dict[str, bytes]:
+        """Facts as texts, by kind."""
+        return {kind: _text(facts) for kind, facts in self.facts.items()}
+
+    @functools.cached_property
     def digests(self) -> dict[str, str]:
         """Digests by the name of the result file's attribute."""
         return {
-            KINDS[kind].attribute: hashlib.sha256(_text(facts)).hexdigest()
-            for kind, facts in self.facts.items()
+            KINDS[kind].attribute: hashlib.sha256(text).hexdigest()
+            for kind, text in self._texts.items()
         }
 
     @functools.cached_property
     def packed(self) -> np.ndarray[Any, Any]:
-        """All facts as bytes."""
-        return np.frombuffer(zlib.compress(_text(self.facts), 1), dtype=np.uint8)
+        """All facts as bytes: the text of one mapping."""
+        parts = [b'"%s": %s' % (kind.encode(), self._texts[kind]) for kind in sorted(self._texts)]
+        return np.frombuffer(zlib.compress(b"{%s}" % b", ".join(parts), 1), dtype=np.uint8)
 
     def changes(self, packed: np.ndarray[Any, Any], kind: str) -> str:
         """Return what differs from the packed facts of another run, empty if nothing does."""

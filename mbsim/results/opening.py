@@ -8,13 +8,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from mbsim.core.stored import apart
+from mbsim.errors import ResultsError
 from mbsim.results.checksums import CheckedFile
+from mbsim.results.damage import said_of
 
 if TYPE_CHECKING:
     import h5py
 
 #: How often a file that is just being published is asked for, and how long between [s].
 _TRIES, _PAUSE = 50, 0.002
+#: What is raised where numbers and tables are not of the form that they should have.
+_FORM = (LookupError, ValueError, TypeError, AttributeError, ArithmeticError)
 _Made = TypeVar("_Made")
 
 
@@ -38,7 +42,15 @@ def opened_file(path: Path) -> h5py.File:
 
 
 def read_apart(do: Callable[[], _Made], *paths: Path) -> _Made:
-    """Return what `do` reads of result files; apart, see `apart`, where one has no checksums."""
+    """Return what `do` reads of result files; apart, see `apart`, where one has no checksums.
+
+    Such a file may hold anything: what no reader foresees in it is damage, not a mistake of ours.
+
+    Raises
+    ------
+    ResultsError
+        If a file without checksums cannot be read.
+    """
     for path in paths:
         try:
             file = CheckedFile(path, lock=False)
@@ -46,5 +58,9 @@ def read_apart(do: Callable[[], _Made], *paths: Path) -> _Made:
             continue  # it is refused in any process
         file.close()
         if not file.checked:
-            return apart(do, *paths)
+            try:
+                return apart(do, *paths)
+            except _FORM as error:
+                names = ", ".join(map(str, paths))
+                raise ResultsError(f"{names}: {said_of(error)}") from None
     return do()

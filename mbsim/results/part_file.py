@@ -18,8 +18,9 @@ from array import array
 from pathlib import Path
 from typing import Any
 
-from mbsim.results.checksums import DamagedError, end_of, renewed, sums_at_end
+from mbsim.results.checksums import DamagedError, end_of, renew, sums_at_end
 from mbsim.results.files import create, locked, unlocked
+from mbsim.results.ranges import Ranges
 
 #: Bytes copied at a time.
 _PIECE = 1 << 20
@@ -45,17 +46,17 @@ class PartFile:
         self._older = target.with_name(f".{target.name}.older")
         self.failure: OSError | None = None
         self._at = 0
-        #: Where bytes were written since both files held the same: [first, end].
-        self._new: list[list[int]] = []
+        #: Where bytes were written since both files held the same.
+        self._new = Ranges()
         self._summed = 0  # the size of what was published last, without its checksums
         #: Checksums of the blocks up to an end, and where was written since they were made.
         self._sums, self._sums_end = array("I"), 0
-        self._unsummed: list[list[int]] = []
+        self._unsummed = Ranges()
         self._published: tuple[int, int] | None = None  # device and inode of the other file
         #: Since the mark: the size there, bytes that were written over, and where was written.
         self._marked: int | None = None
         self._undo: list[tuple[int, bytes]] = []
-        self._passing: list[list[int]] = []
+        self._passing = Ranges()
         self._fd = create(self.path)
         locked(self._fd)
         if resume:
@@ -101,20 +102,20 @@ class PartFile:
                 self._at += done
         except OSError as error:
             self.failure = error
-        _note(self._new, first, first + size)
-        _note(self._unsummed, first, first + size)
+        self._new.add(first, first + size)
+        self._unsummed.add(first, first + size)
         return size
 
     def mark(self) -> None:
         """Let what is written from here on be in the next publication alone."""
-        self._marked, self._undo, self._passing = self._size(), [], []
+        self._marked, self._undo, self._passing = self._size(), [], Ranges()
 
     def _remember(self, first: int, end: int) -> None:
         """Keep bytes before the mark that are about to be written over."""
         if self._marked is not None and first < self._marked:
             end = min(end, self._marked)
             self._undo.append((first, os.pread(self._fd, end - first, first)))
-            _note(self._passing, first, end)
+            self._passing.add(first, end)
 
     def truncate(self, size: int) -> None:
         """Set the file's size."""
@@ -187,10 +188,11 @@ class PartFile:
     def _sum_up(self) -> None:
         """Make the checksums of what was written since they were made last."""
         size, end = self._size(), self._sums_end
-        # what lies behind an end that has moved is new too, written or not
-        moved = [[min(size, end), size]] if size != end else []
-        self._sums = renewed(self._fd, self._sums, _merged(self._unsummed + moved), size)
-        self._sums_end, self._unsummed = size, []
+        if size != end:
+            # what lies behind an end that has moved is new too, written or not
+            self._unsummed.add(min(size, end), size)
+        renew(self._fd, self._sums, self._unsummed.merged(), size)
+        self._sums_end, self._unsummed = size, Ranges()
 
     def _keep(self) -> bool:
         """Give the published file a second name; return whether it is there and ours."""
@@ -214,11 +216,11 @@ class PartFile:
             # somebody who reads it has it locked; where no lock can be had nobody knows
             if locked(self._fd):
                 os.ftruncate(self._fd, older)
-                for first, end in _merged(self._new):
+                for first, end in self._new.merged():
                     _copy(done, self._fd, first, min(end, size))
                 os.ftruncate(self._fd, size)
                 os.replace(self._older, self.path)
-                self._new = []
+                self._new = Ranges()
                 self._go_back()
                 return
             os.close(self._fd)
@@ -238,8 +240,8 @@ class PartFile:
             _write(self._fd, data, first)
         # of these the published file and the checksums have others
         self._new, self._summed = self._passing, self._marked
-        self._unsummed, self._sums_end = [*map(list, self._passing)], self._marked
-        self._marked, self._undo, self._passing = None, [], []
+        self._unsummed, self._sums_end = self._passing.copied(), self._marked
+        self._marked, self._undo, self._passing = None, [], Ranges()
 
     def _copy_from(self, path: Path) -> None:
         """Fill the part file with another's bytes; `DamagedError` where they are not right."""
@@ -248,11 +250,12 @@ class PartFile:
             found = sums_at_end(handle)
             sums, size = found or (array("I"), os.fstat(handle).st_size)
             _copy(handle, self._fd, 0, size)
-        whole = renewed(self._fd, array("I"), [[0, size]], size)
+        whole = array("I")
+        renew(self._fd, whole, [[0, size]], size)
         if found is not None and sums != whole:
             raise DamagedError("its bytes are not those that were written")
-        self._sums, self._summed, self._new = whole, size, []
-        self._sums_end, self._unsummed = size, []
+        self._sums, self._summed, self._new = whole, size, Ranges()
+        self._sums_end, self._unsummed = size, Ranges()
 
     @staticmethod
     def discard(path: Path) -> None:
@@ -271,25 +274,6 @@ class PartFile:
         self.discard(self._older)
 
 
-def _note(ranges: list[list[int]], first: int, end: int) -> None:
-    """Add a range, to the last one where it begins in it or behind it."""
-    if ranges and ranges[-1][0] <= first <= ranges[-1][1]:
-        ranges[-1][1] = max(ranges[-1][1], end)
-    else:
-        ranges.append([first, end])
-
-
-def _merged(ranges: list[list[int]]) -> list[list[int]]:
-    """Return ranges in order, those that touch as one."""
-    found: list[list[int]] = []
-    for first, end in sorted(ranges):
-        if found and first <= found[-1][1]:
-            found[-1][1] = max(found[-1][1], end)
-        else:
-            found.append([first, end])
-    return found
-
-
 def _copy(source: int, target: int, first: int, end: int) -> None:
     """Copy bytes of one open file to the same place of another; ends where the source does."""
     while first < end:
@@ -300,7 +284,7 @@ def _copy(source: int, target: int, first: int, end: int) -> None:
         first += len(piece)
 
 
-def _write(target: int, data: bytes, first: int) -> None:
+def _write(target: int, data: bytes | bytearray, first: int) -> None:
     """Write all bytes to a place of an open file."""
     view = memoryview(data)
     while len(view):

@@ -36,7 +36,7 @@ from mbsim.results.forces import check_requests
 from mbsim.results.identity import Identity
 from mbsim.results.memory import MemoryStore
 from mbsim.results.reading import Results, open_results
-from mbsim.results.resume import MADE_OF, WRITTEN, check_same, digest
+from mbsim.results.resume import MADE_OF, WRITTEN, digest, read_checkpoint
 from mbsim.results.signal_filter import SignalFilter
 from mbsim.results.signals import Before, before_rows, length_of, names_of, request_columns, signals
 from mbsim.results.store import Store, Value
@@ -56,7 +56,7 @@ FEWEST_ROWS = 16
 TIME_BYTES = 32
 #: Time between two publications: at least this [s], and so many times what one takes.
 FLUSH_SECONDS = 5.0
-FLUSH_SHARE = 20.0
+FLUSH_SHARE = 50.0
 #: The first comes sooner, so that a folder soon shows this run and not an earlier one.
 FIRST_FLUSH_SECONDS = 1.0
 
@@ -117,6 +117,9 @@ class Recorder:
         self._started = False  # whether state/incident_offsets has its first 0
         self._published_at = time.monotonic() - (FLUSH_SECONDS - FIRST_FLUSH_SECONDS)
         self._flush_seconds = 0.0  # what the last flush took
+        self._flushing = False
+        #: How many flushes there were.
+        self.flushes = 0
         self._target: Path | None = None
         self._saved: set[str] = set()  # tables of the checkpoint in the part file
         self._last: dict[str, Table] = {}  # those of the last published one
@@ -153,37 +156,13 @@ class Recorder:
 
     def _resumed(self) -> dict[str, Table]:
         """Return the checkpoint to go on from, after comparing what it was made with."""
-        if self._target is None:
-            raise ModelError("resume: there is no folder with results to go on from")
-        if not self._target.is_file():
-            raise ModelError(f"--resume: {self._target}: no such file; start without --resume")
-        try:
-            with open_results(self._target) as results:
-                if not results.checked:
-                    raise ModelError(
-                        f"--resume: {self._target}: has no checksums: it is of an earlier version, "
-                        "or damaged; start without --resume"
-                    )
-                check_same(self._target, results, self._settings, self._identity)
-                tables = results.tables("checkpoint")
-                if results.attribute("checkpoint", "sha256") != digest(tables):
-                    raise ModelError(
-                        f"--resume: {self._target}: the checkpoint is damaged: its numbers are not "
-                        "those that were written; start without --resume"
-                    )
-                self._started = self.shown = True
-                self._saved, self._last = set(tables), dict(tables)
-                tables.pop(MADE_OF, None)
-                self._written = tables.pop(WRITTEN).tolist()
-                if len(results["time"]) < self._written[0]:
-                    raise ModelError(
-                        f"--resume: {self._target}: has fewer rows than its checkpoint was made "
-                        "behind; start without --resume"
-                    )
-                self.watch.restore(tables)
-                return tables
-        except ResultsError as error:
-            raise ModelError(f"--resume: {error}") from None
+        tables = read_checkpoint(self._target, self._settings, self._identity)
+        self._started = self.shown = True
+        self._saved, self._last = set(tables), dict(tables)
+        tables.pop(MADE_OF, None)
+        self._written = tables.pop(WRITTEN).tolist()
+        self.watch.restore(tables)
+        return tables
 
     def check_room(self, rows: float) -> None:
         """Make ready for so many output rows; raise `ModelError` where they cannot be kept.
@@ -211,6 +190,7 @@ class Recorder:
 
     def take(self) -> None:
         """Take all rows, incidents and events that the pipeline has left so far."""
+        self._background.check()
         rows = self.system.scene.rows
         n, incidents, events = rows.used.tolist()
         if n == incidents == events == 0:
@@ -264,17 +244,20 @@ class Recorder:
             self._posts.end()
 
     def due(self) -> bool:
-        """Return whether it is time for a flush: they cost a twentieth of the run at most."""
+        """Return whether it is time for a flush: they cost a fiftieth of the run at most."""
         pause = max(FLUSH_SECONDS, FLUSH_SHARE * self._flush_seconds)
-        return self._target is not None and time.monotonic() - self._published_at > pause
+        passed = time.monotonic() - self._published_at
+        return self._target is not None and not self._flushing and passed > pause
 
-    def flush(self, checkpoint: Mapping[str, Table]) -> None:
+    def flush(self, checkpoint: Mapping[str, Table], beside: bool = False) -> None:
         """Publish all rows taken so far together with the checkpoint that follows them.
 
         Parameters
         ----------
         checkpoint : mapping of str to ndarray
             Full state after the last row taken, by names that may hold "/".
+        beside : bool
+            Return at once: `take` raises what fails, and `flushes` counts when it is done.
 
         Raises
         ------
@@ -283,22 +266,33 @@ class Recorder:
         """
         if self._target is None:
             return
+        watched = self.watch.saved()
+        self._flushing = True
+        work = partial(self._flush, self._gathered.block, checkpoint, watched)
+        if beside:
+            self._background.begin(work)
+        else:
+            work()
+
+    def _flush(self, block: Block, checkpoint: Mapping[str, Table], watched: Tables) -> None:
+        """Publish a block of rows, which are still gathered behind, and a checkpoint."""
         began = time.perf_counter()
-        self._background.wait()
         before = self._written, self._saved, self._started
-        self._store.mark()
-        self._put(self._gathered.block)
-        self._save(self._state(checkpoint))
-        self._show()
-        self._store.publish()
+        with self._store.writing():
+            self._store.mark()
+            self._put(block)
+            self._save(self._state(checkpoint, watched))
+            self._show()
+            self._store.publish()
         self._written, self._saved, self._started = before
         self._published_at = time.monotonic()
         self._flush_seconds = time.perf_counter() - began
+        self._flushing, self.flushes = False, self.flushes + 1
 
-    def _state(self, checkpoint: Mapping[str, Table]) -> dict[str, Table]:
+    def _state(self, checkpoint: Mapping[str, Table], watched: Tables) -> dict[str, Table]:
         """Return all tables of a checkpoint made behind the last row written."""
         facts = {MADE_OF: self._identity.packed, WRITTEN: np.array(self._written)}
-        return {**checkpoint, **self.watch.saved(), **facts}
+        return {**checkpoint, **watched, **facts}
 
     def _save(self, tables: dict[str, Table]) -> None:
         """Write a checkpoint in the place of the last one."""
@@ -393,7 +387,7 @@ class Recorder:
             saved = self._saved
             self._store.mark()
             if checkpoint is not None:
-                self._save(self._state(checkpoint()))
+                self._save(self._state(checkpoint(), self.watch.saved()))
             self._show()
             self._store.publish()
             self._saved = saved
@@ -401,7 +395,11 @@ class Recorder:
         if failure is not None:
             status = "interrupted"
         if status != "finished" and (checkpoint is not None or self._last):
-            self._save(self._state(checkpoint()) if checkpoint is not None else self._last)
+            self._save(
+                self._state(checkpoint(), self.watch.saved())
+                if checkpoint is not None
+                else self._last
+            )
         over = ["checkpoint"] if status == "finished" else []
         self._store.update(attributes={"/": {"status": status}}, remove=over)
         in_memory = self._store.finish()

@@ -5,11 +5,11 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbsim.errors import ModelError
+from mbsim.errors import ModelError, ResultsError
 from mbsim.results.blocks import Table
 from mbsim.results.csv_file import write_csv
 from mbsim.results.identity import KINDS, Identity
@@ -83,3 +83,41 @@ def completed(model: Model, directory: Path, tell: Callable[[str], None]) -> Res
     write_csv(path, results, ids)
     tell(f"{target}: this run has finished; {path.name} was missing and is written again")
     return results
+
+
+def read_checkpoint(
+    target: Path | None, settings: Mapping[str, Any], identity: Identity
+) -> dict[str, Table]:
+    """Return the checkpoint of a result file, after comparing what it was made with.
+
+    Raises
+    ------
+    ModelError
+        If there is none, it is damaged, or it was made with another model or other settings.
+    """
+    if target is None:
+        raise ModelError("resume: there is no folder with results to go on from")
+    if not target.is_file():
+        raise ModelError(f"--resume: {target}: no such file; start without --resume")
+    try:
+        with open_results(target) as results:
+            if not results.checked:
+                raise ModelError(
+                    f"--resume: {target}: has no checksums: it is of an earlier version, "
+                    "or damaged; start without --resume"
+                )
+            check_same(target, results, settings, identity)
+            tables = results.tables("checkpoint")
+            if results.attribute("checkpoint", "sha256") != digest(tables):
+                raise ModelError(
+                    f"--resume: {target}: the checkpoint is damaged: its numbers are not "
+                    "those that were written; start without --resume"
+                )
+            if len(results["time"]) < tables[WRITTEN][0]:
+                raise ModelError(
+                    f"--resume: {target}: has fewer rows than its checkpoint was made "
+                    "behind; start without --resume"
+                )
+    except ResultsError as error:
+        raise ModelError(f"--resume: {error}") from None
+    return tables

@@ -380,7 +380,7 @@ class Runner:
         from mbsim.integrators import scheme
 
         method, simulation = self.method, stage.simulation
-        budget = FIRST_BUDGET if self.dump is None else 1
+        budget, flushes = FIRST_BUDGET if self.dump is None else 1, self.recorder.flushes
         if not self._enter_stage(stage, fresh):
             return
         # a resumed run stands there too, where the one before it had not gone on for good
@@ -417,7 +417,9 @@ class Runner:
             self._stop_if_asked()
             if self._first is None and self.recorder.due():
                 with self._undisturbed():
-                    self.recorder.flush(self.checkpoint())
+                    self.recorder.flush(self.checkpoint(), beside=True)
+            if self.recorder.flushes > flushes:
+                flushes = self.recorder.flushes
                 self.log.show()
             if progress is not None:
                 h = float(method.memory[scheme.STEP])

@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import json
 import struct
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mbsim.errors import ResultsError
 from mbsim.model.elements import Array, Graphic
 from mbsim.model.tessellation import triangles_of
 from mbsim.results.units import POSITION, TIME, UnitSystem
@@ -216,11 +214,3 @@ def _binary(document: dict[str, Any], data: bytes) -> bytes:
     chunks = struct.pack("<I4s", len(text), b"JSON") + text
     chunks += struct.pack("<I4s", len(data), b"BIN\0") + data
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
-
-
-def write_glb(scene: Scene, file: Path) -> None:
-    """Write a run as a .glb file; ResultsError where it cannot be written."""
-    try:
-        file.write_bytes(glb(scene))
-    except OSError as error:
-        raise ResultsError(f"{file}: {error.strerror}") from None

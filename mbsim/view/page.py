@@ -8,7 +8,6 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from mbsim.errors import ResultsError
 from mbsim.results.units import POSITION, TIME
 from mbsim.view.packing import text_of
 from mbsim.view.run_data import ROOM, RunData, run_data
@@ -78,7 +77,7 @@ def document(title: str, body: str, style: str, script: str, connect: str = "'no
 
     `title` is escaped here; `script` follows ours; `connect` as in `page`.
     """
-    return static("page.html").format(
+    text = static("page.html").format(
         title=escape(title),
         connect=connect,
         style=style,
@@ -86,6 +85,8 @@ def document(title: str, body: str, style: str, script: str, connect: str = "'no
         library=library(),
         script=scripts() + script,
     )
+    # bytes of file names that are no text as escapes
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def page(
@@ -115,11 +116,3 @@ def page(
 def title_of(scenes: Sequence[Scene]) -> str:
     """Return what the page of these runs is called."""
     return " and ".join(scene.name for scene in scenes)
-
-
-def write(file: Path, text: str) -> None:
-    """Write a page; ResultsError where the file cannot be written."""
-    try:
-        file.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ResultsError(f"{file}: {error.strerror}") from None

@@ -11,16 +11,22 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from mbsim.errors import ModelError, ResultsError
+from mbsim.results.products import check_product, write_product
 from mbsim.view.browser import Page, needed_browser, opened_page
 
 #: Frames a second of a film, of an animated GIF, and most frames of either.
 FILM_RATE, GIF_RATE, MOST_FRAMES = 30, 20, 3000
+#: Kinds of pictures, and the options that ask for them.
+PNG, GIF, MP4 = ("PNG picture", "--png"), ("GIF picture", "--gif"), ("film", "--mp4")
 #: Seconds that a film takes where no speed is asked for: at least, at most.
 _SHORT, _LONG = 2.5, 20.0
 
 
 def check_tools(png: Path | None, gif: Path | None, mp4: Path | None) -> None:
-    """Raise `ModelError` where something is missing that these pictures need."""
+    """Raise `ModelError` where something is missing that these pictures need, or is in the way."""
+    for file, about in ((png, PNG), (gif, GIF), (mp4, MP4)):
+        if file is not None:
+            check_product(file, *about)
     if png or gif or mp4:
         needed_browser()
     if mp4 is not None and shutil.which("ffmpeg") is None:
@@ -40,7 +46,7 @@ class Camera:
     def __init__(self, page: Page, text: str, folder: Path) -> None:
         self.page = page
         file = folder / "view.html"
-        file.write_text(text, encoding="utf-8")
+        file.write_bytes(text.encode("utf-8"))
         page.open(file.as_uri())
         first, last = page.run("mbsimReady.then(view => view.span)")
         self.span: tuple[float, float] = (float(first), float(last))
@@ -103,18 +109,13 @@ def make(
         camera = Camera(page, text, Path(folder))
         if png is not None:
             at = 0.5 * sum(camera.span) if time is None else time
-            _write(png, camera.picture(at))
+            write_product(png, camera.picture(at), *PNG)
         if gif is not None:
-            _write(gif, _gif(camera.frames(camera.times(GIF_RATE, speed))))
+            write_product(gif, _gif(camera.frames(camera.times(GIF_RATE, speed))), *GIF)
         if mp4 is not None:
-            _film(camera.frames(camera.times(FILM_RATE, speed)), mp4)
-
-
-def _write(file: Path, data: bytes) -> None:
-    try:
-        file.write_bytes(data)
-    except OSError as error:
-        raise ResultsError(f"{file}: {error.strerror}") from None
+            film = Path(folder) / "film.mp4"
+            _film(camera.frames(camera.times(FILM_RATE, speed)), film)
+            write_product(mp4, film.read_bytes(), *MP4)
 
 
 def _gif(frames: Iterator[bytes]) -> bytes:

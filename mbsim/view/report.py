@@ -7,6 +7,7 @@ import json
 from html import escape
 from pathlib import Path
 
+from mbsim.core.stored import read_regular
 from mbsim.errors import MbsimError
 from mbsim.model.elements import Model
 from mbsim.model.subroutines import wanted
@@ -79,7 +80,7 @@ def _deck(results: Results) -> tuple[Path, bytes | None, str]:
     """Return the deck's path, its bytes if it is the one that was run, and what to say else."""
     file = Path(str(results.attributes.get("model_file", "")))
     try:
-        data = file.read_bytes()
+        data = read_regular(file)
     except (OSError, ValueError) as error:
         return file, None, f"{file} cannot be read: {getattr(error, 'strerror', error)}"
     if hashlib.sha256(data).hexdigest() != results.attributes.get("model_sha256"):
@@ -123,7 +124,7 @@ def _texts(results: Results, model: Model | None) -> str:
         found.append(_quoted(file, data, "as it was run"))
     for script in _scripts(results, model):
         try:
-            data = script.read_bytes()
+            data = read_regular(script)
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", error)
             found.append(f'<p class="note">{escape(f"{script} cannot be read: {reason}")}</p>')

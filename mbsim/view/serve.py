@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+import re
 import threading
 from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
 from mbsim.errors import MbsimError, ResultsError
+from mbsim.results.opening import read_apart
 from mbsim.results.reading import open_results
 from mbsim.view.page import factors, packs_of, page, title_of
 from mbsim.view.run_data import RunData
@@ -51,16 +53,18 @@ class Served:
             if version == self._version:
                 return
             try:
-                with ExitStack() as stack:
-                    scenes = [
-                        read_scene(stack.enter_context(open_results(file))) for file in self.files
-                    ]
-                    self._packs = packs_of(scenes, self.asked)
-                    self._running = any(s.results.status == "running" for s in scenes)
-                    self.title, self.factors = title_of(scenes), factors(scenes)
+                found = read_apart(self._read, *self.files)
+                self._packs, self._running, self.title, self.factors = found
                 self._version = version
             except MbsimError as error:
                 self._message = str(error)
+
+    def _read(self) -> tuple[list[RunData], bool, str, list[dict[str, float]]]:
+        """Return packs, whether a run goes on, title and factors."""
+        with ExitStack() as stack:
+            scenes = [read_scene(stack.enter_context(open_results(file))) for file in self.files]
+            running = any(scene.results.status == "running" for scene in scenes)
+            return packs_of(scenes, self.asked), running, title_of(scenes), factors(scenes)
 
     def state(self) -> dict[str, Any]:
         """Return what a page asks for now and then."""
@@ -103,7 +107,7 @@ def server(served: Served, port: int = 0) -> ThreadingHTTPServer:
                 self._answer(200, "text/html; charset=utf-8", served.document().encode())
             elif path == "state":
                 self._answer(200, "application/json", json.dumps(served.state()).encode())
-            elif path.startswith("pack/") and path[5:].isdecimal():
+            elif re.fullmatch("pack/[0-9]", path):
                 data = served.pack(int(path[5:]))
                 if data is None:
                     self._answer(404, "text/plain", b"no such run")
@@ -113,12 +117,14 @@ def server(served: Served, port: int = 0) -> ThreadingHTTPServer:
                 self._answer(404, "text/plain", b"nothing is here")
 
         def _answer(self, code: int, kind: str, data: bytes) -> None:
-            self.send_response(code)
-            self.send_header("Content-Type", kind)
-            self.send_header("Content-Length", str(len(data)))
-            self.send_header("Cache-Control", "no-store")
-            self.end_headers()
-            self.wfile.write(data)
+            # a page that was closed waits for no answer
+            with suppress(ConnectionError):
+                self.send_response(code)
+                self.send_header("Content-Type", kind)
+                self.send_header("Content-Length", str(len(data)))
+                self.send_header("Cache-Control", "no-store")
+                self.end_headers()
+                self.wfile.write(data)
 
         def log_message(self, format: str, *arguments: Any) -> None:
             """Say nothing of each request."""

@@ -40,6 +40,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="forks")
 Do = Callable[[Path, random.Random], None]
 #: What takes longer than most is done with one of so many files.
 SLOW = {"info_of_results, objects": 4, "read_results, objects": 4, "draw_results, objects": 4}
+SLOW |= {"view_results, objects": 4, "report_results, objects": 4}
 SLOW |= {"fclib, objects": 4, "plot_results, objects": 10, "plot_results, bytes": 10}
 
 
@@ -158,8 +159,21 @@ def plot_results(path: Path, chance: random.Random) -> None:
     command("plot", str(path), "bodies/*/position", "-o", str(path.with_suffix(".png")))
 
 
+def view_results(path: Path, chance: random.Random) -> None:
+    """Write a page, or a model for other programs."""
+    option, suffix = chance.choice((("-o", ".html"), ("--gltf", ".glb")))
+    command("view", str(path), option, str(path.with_suffix(suffix)))
+
+
+def report_results(path: Path, chance: random.Random) -> None:
+    command("report", str(path), "-o", str(path.with_suffix(".html")))
+
+
+READERS = (info_of_results, read_results, draw_results, plot_results, view_results, report_results)
+
+
 @pytest.mark.parametrize("change", ["bytes", "objects"])
-@pytest.mark.parametrize("do", [info_of_results, read_results, draw_results, plot_results])
+@pytest.mark.parametrize("do", READERS)
 def test_result_files(tmp_path: Path, change: str, do: Do) -> None:
     seeds = result_files(tmp_path)
     (tmp_path / "try").mkdir()

@@ -67,6 +67,8 @@ def test_in_the_place_of_what_a_command_names(
     for command in ("check", "info", "run", "request"):
         refuses(command, str(tmp_path / name), *(["--list"] if command == "request" else []))
     refuses("plot", str(tmp_path / name), "time")
+    for command in ("view", "report"):
+        refuses(command, str(tmp_path / name), "-o", str(tmp_path / "page.html"))
 
 
 @pytest.mark.slow

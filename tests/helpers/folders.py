@@ -12,6 +12,7 @@ ROOT = Path(__file__).resolve().parents[2]
 TESTS = ROOT / "tests"
 DATA = TESTS / "data"
 MODELS = ROOT / "models"
+CORPUS = TESTS / "corpus"
 USERFUNCS = ROOT / "userfuncs"
 #: Where processes of their own find the package under test.
 PACKAGES = Path(mbsim.__file__).resolve().parents[1]

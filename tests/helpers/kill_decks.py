@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from helpers.decks import COULOMB, GRAVITY, GROUND, contact, sphere
-from helpers.folders import MODELS, USERFUNCS
+from helpers.folders import CORPUS, MODELS, USERFUNCS
 from helpers.libraries import example
 from helpers.pile_decks import block, pile, shape_graphic, solid
 
@@ -56,6 +56,12 @@ def written(folder: Path, model: str, commands: str) -> str:
 def of_models(name: str, *options: str) -> Callable[[Path], Case]:
     """Return the case of a deck of models/."""
     return lambda folder: (str(MODELS / f"{name}.xml"), list(options))
+
+
+def of_corpus(name: str, end: str) -> Callable[[Path], Case]:
+    """Return the case of a deck of tests/corpus/, with many rows."""
+    deck = str(CORPUS / name)
+    return lambda folder: (deck, ["--end-time", end, "--print-interval", "0.001"])
 
 
 def sliding(folder: Path, law: dict[str, str], end: float, *options: str) -> Case:
@@ -198,4 +204,11 @@ CASES: dict[str, Callable[[Path], Case]] = {
     "gear pair": of_models("gear_pair", "--end-time", "0.004", "--print-interval", "0.0001"),
     "mixed pile": of_models("mixed_pile", "--end-time", "0.03", "--print-interval", "0.0005"),
     "some signals": some_signals,
+    "walls, MOREAU": of_models("poisson_walls", "--integrator", "MOREAU", "--end-time", "3000"),
+    "stack, MOREAU": of_models(
+        "stiff/box_stack", "--integrator", "MOREAU", "--end-time", "8", "--print-interval", "0.0005"
+    ),
+    "Adams, gears": of_corpus("adams_gear.acf", "10"),
+    "Adams, contact": of_corpus("adams_contact.adm", "20"),
+    "Force_Field": of_corpus("force_field.xml", "100"),
 }

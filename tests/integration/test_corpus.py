@@ -18,10 +18,9 @@ import numpy as np
 import pytest
 
 import mbsim
-from helpers.folders import ROOT
+from helpers.folders import CORPUS
 from mbsim.errors import DeckError
 
-CORPUS = ROOT / "tests" / "corpus"
 _CHECK = re.compile(r"check: (\d+)\.F(\d) at (\S+) = (\S+) within (\S+)")
 _RUN = re.compile(r"run: (.*)")
 _REFUSED = re.compile(r"refused: (\d+): (.*)")

@@ -21,6 +21,7 @@ from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
 from mbsim.warming import tasks
 
 ROOT = Path(__file__).resolve().parents[2]
+DROP = str(ROOT / "models" / "drop_m.xml")
 #: Any machine that runs the tests runs the code of one of these.
 FAMILY = processors.runnable()[-1] if processors.runnable() else "generic"
 LAW = """
@@ -120,6 +121,22 @@ def test_code_is_kept_nowhere_if_its_folder_cannot_be_written(tmp_path):
     nowhere = tmp_path / "a file"
     nowhere.write_text("")
     assert in_a_process(nowhere)[0] == "1"
+
+
+def test_a_folder_that_keeps_no_code_is_told_before_anything_is_compiled(tmp_path):
+    """By `warm` alone, which has no other purpose: a run goes on without."""
+    (tmp_path / "taken").touch()
+    options = [DROP, "--target", "generic", "-o", str(tmp_path / "taken")]
+    found = CliRunner().invoke(main, ["warm", *options])
+    assert found.exit_code == 5
+    assert "taken" in found.stderr
+    environment = {**os.environ, "MBSIM_CACHE_DIR": str(tmp_path / "taken")}
+    line = [sys.executable, "-m", "mbsim", "warm", DROP]
+    done = subprocess.run(line, env=environment, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 5
+    assert "cannot be kept" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert "functions compiled" not in done.stdout
 
 
 def test_families_and_what_they_need():

@@ -202,3 +202,82 @@ def test_rows_that_are_dropped_again_are_not_kept_in_memory(
         assert results["events"]["time"].max() < 1.0
     if folder:
         assert not [path for path in folder.iterdir() if path.name.startswith(".")]
+
+
+def published(folder: Path, beside: bool) -> tuple[bytes, list[int]]:
+    """Record a run that is published after every fifth row; return its file, and the flushes."""
+    recorder = recorder_of(folder)
+    counts = []
+
+    def look() -> None:
+        recorder.flush(checkpoint(7), beside)
+        counts.append(recorder.flushes)
+
+    go_on(recorder, 0, look)
+    close(recorder)
+    return (folder / "deck.h5").read_bytes(), counts
+
+
+def test_flushes_beside_the_loop_change_no_byte(tmp_path: Path) -> None:
+    beside, _ = published(tmp_path / "beside", True)
+    before, counts = published(tmp_path / "before", False)
+    assert beside == before
+    assert counts == list(range(1, ROWS // 5 + 1))
+    assert numbers(tmp_path / "beside") == ("finished", list(range(ROWS)))
+
+
+def test_rows_go_on_while_results_are_published(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What was published holds the rows up to the flush, though others have come meanwhile."""
+    recorder, go = recorder_of(tmp_path), threading.Event()
+    plain = Recorder._flush
+
+    def late(self: Recorder, *given: Any) -> None:
+        assert go.wait(60.0)
+        plain(self, *given)
+
+    monkeypatch.setattr(Recorder, "_flush", late)
+    add_rows(recorder.system, 0, 10)
+    recorder.take()
+    recorder.flush(checkpoint(10), beside=True)
+    assert not recorder.due()
+    assert not recorder.flushes
+    add_rows(recorder.system, 10, 5)
+    recorder.take()
+    go.set()
+    recorder._background.wait()
+    assert recorder.flushes == 1
+    assert numbers(tmp_path) == ("running", list(range(10)))
+    go_on(recorder, 15)
+    close(recorder)
+    assert numbers(tmp_path) == ("finished", list(range(ROWS)))
+
+
+@pytest.mark.parametrize("name", ["_put", "_save", "_show"])
+def test_a_flush_that_fails_beside_is_told_when_rows_come(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """The flush before it stays, and the run goes on from there."""
+    recorder = recorder_of(tmp_path)
+    add_rows(recorder.system, 0, 10)
+    recorder.take()
+    recorder.flush(checkpoint(10))
+    with monkeypatch.context() as patch:
+        patch.setattr(Recorder, name, failing(getattr(Recorder, name), 1, MemoryError()))
+        add_rows(recorder.system, 10, 3)
+        recorder.take()
+        recorder.flush(checkpoint(13), beside=True)
+        assert recorder._background._thread is not None
+        recorder._background._thread.join()
+        add_rows(recorder.system, 13, 3)
+        with pytest.raises(ResultsError, match="memory"):
+            recorder.take()
+    with pytest.raises(ResultsError, match="memory"):
+        close(recorder, "failed")
+    assert numbers(tmp_path) == ("running", list(range(10)))
+    again = recorder_of(tmp_path, resume=True)
+    assert again.checkpoint["stage"] == 10
+    go_on(again, 10)
+    close(again)
+    assert numbers(tmp_path) == ("finished", list(range(ROWS)))
