@@ -255,4 +255,7 @@ SCHEME = Scheme(
     implicit=True,
     carried=3,
     samples=4,
+    # what it damps of a fast vibration is by steps of one length: a long one after a shorter one
+    # feeds it
+    resumes=0.03,
 )

@@ -119,6 +119,9 @@ class Scheme(NamedTuple):
     pair: bool = False  # solves with complex coefficients as well
     watched: int = 0  # rows of k where AUTO watches it
     samples: int = 1  # parts of a step of others in which it sees as much, at the ends alone
+    # a step that is cut to less than this part, where a force in touch ends, tells nothing of the
+    # next one, which is as long as it was meant to be
+    resumes: float = 1.0
 
 
 @tags.state
@@ -156,6 +159,7 @@ class Steps(NamedTuple):
     order: float
     memory: float
     implicit: bool
+    resumes: float
     # what only some problems need, 0 for others: `branches.serve`, `events.serve`; of AUTO's
     # implicit method `attempt` of the explicit one, and `changing.serve` that tries it
     branches: int

@@ -156,6 +156,18 @@ def test_looser_is_not_slower_where_friction_turns_round_within_the_tolerance(me
     assert loose.stats["rhs_evaluations"] < most
 
 
+@pytest.mark.parametrize("method", ["RADAU5", "AUTO"])
+def test_steps_behind_the_end_of_a_force_are_as_long_as_they_were(method):
+    """They grew from 1e-11 s: what bounces took RADAU5 2.7 times as many at 1e-2 as at 1e-3."""
+    model = mbsim.read_model(STIFF / "standing_cylinder.xml")
+    counts = {
+        tol: mbsim.simulate(model, integrator=method, tol=tol).stats["rhs_evaluations"]
+        for tol in (1e-2, 1e-3, 1e-5)
+    }
+    assert counts[1e-2] < 1.2 * counts[1e-3] < 1.44 * counts[1e-5]
+    assert counts[1e-5] < 1000
+
+
 @pytest.mark.parametrize("name", ["lugre_stick_slip", "belt_stick_slip"])
 def test_stick_and_slip_in_turn_are_stiff_again_at_once(name):
     """Between phases of slip AUTO waited longer each time: 2.7 times RADAU5's evaluations."""
