@@ -9,6 +9,7 @@ from mbsim.core.address import vector_at, view
 from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.contact.detection import find_contacts
+from mbsim.dynamics.contact.effects import friction_left, impact_left, pressure_left
 from mbsim.dynamics.contact.fcl_points import another_point, bounding_gap
 from mbsim.dynamics.contact.fixed_step import hold_back
 from mbsim.dynamics.contact.forces import add_contact, contact_of
@@ -32,8 +33,6 @@ from mbsim.dynamics.pipeline.output import (
     fill_contacts,
     fill_incidents,
     find_fault,
-    friction_left,
-    impact_left,
 )
 
 
@@ -160,6 +159,10 @@ def measure_effects(context: int, what: int, t: float, h: float, a: Pointer, b: 
     e, y = vector_at(a, n), vector_at(b, n)
     if what == Effects.IMPACT:
         return impact_left(scene, t, e, y)
+    if what == Effects.PRESSURE:
+        largest = pressure_left(scene, e, y)
+        failure_or(scene, 0)  # laws are explored, not asked
+        return largest
     return friction_left(scene, e, y, what == Effects.REVERSAL)
 
 
