@@ -9,7 +9,6 @@ from mbsim.core.address import vector_at, view
 from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.contact.detection import find_contacts
-from mbsim.dynamics.contact.effects import friction_left, impact_left, pressure_left
 from mbsim.dynamics.contact.fcl_points import another_point, bounding_gap
 from mbsim.dynamics.contact.fixed_step import hold_back
 from mbsim.dynamics.contact.forces import add_contact, contact_of
@@ -20,6 +19,7 @@ from mbsim.dynamics.contact.points import commit_gaps, commit_incidents
 from mbsim.dynamics.contact.spreading import ask_over_patch
 from mbsim.dynamics.contact.tilting import damp_tilting
 from mbsim.dynamics.events.contact_stability import add_all_meeting, add_all_touching
+from mbsim.dynamics.events.effects import friction_left, impact_left, pressure_left
 from mbsim.dynamics.events.step_limits import longest_step
 from mbsim.dynamics.pipeline.audit import (
     examine_friction,
