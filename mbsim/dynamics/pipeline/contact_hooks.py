@@ -3,7 +3,16 @@
 from __future__ import annotations
 
 from mbsim.arrays.codes import AT_FAULT, USED_ROWS
-from mbsim.arrays.hooks import Contacts, Effects, FclPoints, Gauges, Recall, Stability, failure_or
+from mbsim.arrays.hooks import (
+    Contacts,
+    Effects,
+    FclPoints,
+    Gauges,
+    Recall,
+    Stability,
+    failure_or,
+    note_failure,
+)
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import vector_at, view
 from mbsim.core.arrays import F1, Pointer
@@ -160,8 +169,11 @@ def measure_effects(context: int, what: int, t: float, h: float, a: Pointer, b: 
     if what == Effects.IMPACT:
         return impact_left(scene, t, e, y)
     if what == Effects.PRESSURE:
+        # laws are explored, not asked: what failed before stays
+        failed = failure_or(scene, 0)
         largest = pressure_left(scene, e, y)
-        failure_or(scene, 0)  # laws are explored, not asked
+        failure_or(scene, 0)
+        note_failure(scene, failed)
         return largest
     return friction_left(scene, e, y, what == Effects.REVERSAL)
 
