@@ -86,6 +86,7 @@ class Effects(IntEnum):
     FRICTION = 0  # change of friction that it causes, over the normal force
     REVERSAL = 1  # the same, with a slip that it turns round
     IMPACT = 2  # change of a closing speed that it causes, over that in a step
+    PRESSURE = 3  # change of normal forces that it causes by speed, over them
 
 
 class Stability(IntEnum):

@@ -22,7 +22,7 @@ from numba.core.registry import cpu_target
 TESTED = ("0.68.1",)
 
 #: Part of the name of the cache's folder: code of another policy is not mixed with it.
-POLICY = "roots2" if numba.__version__ in TESTED else "all"
+POLICY = "roots3" if numba.__version__ in TESTED else "all"
 
 _ENVIRONMENT = "_ZN08NumbaEnv"
 _RECURSIVE = codegen.RuntimeLinker.PREFIX
@@ -36,6 +36,7 @@ class RootLibrary(codegen.JITCodeLibrary):
 
     _as_lowered: Any = None
     _from_cache = False
+    _bitcode = b""
 
     def add_linking_library(self, library: Any) -> None:
         """Remember what this function calls, without optimising or emitting it."""
@@ -98,12 +99,38 @@ class RootLibrary(codegen.JITCodeLibrary):
         if lines:
             self._final_module.link_in(llvm.parse_assembly("\n".join(lines)))
 
+    def serialize_using_object_code(self) -> Any:
+        """Return what is stored: machine code, what it defines, and bitcode for linking."""
+        name, kind, (code, bitcode) = super().serialize_using_object_code()  # type: ignore[no-untyped-call]
+        return name, kind, (code, bitcode, tuple(_defined(self._get_module_for_linking())))
+
     @classmethod
     def _unserialize(cls, codegen: Any, state: Any) -> Any:
-        """Return the library that the cache holds: optimised, nothing to link."""
-        library = super()._unserialize(codegen, state)  # type: ignore[no-untyped-call]
-        library._from_cache = True
+        """Return the library that the cache holds: optimised, nothing to link.
+
+        Its bitcode is not parsed: that takes ten times as long as to load the machine code, and
+        only a root that calls another one would want it.
+        """
+        name, _, (code, bitcode, defined) = state
+        library = codegen.create_library(name)
+        library._from_cache, library._bitcode = True, bitcode
+        library.enable_object_caching()
+        library._set_compiled_object(code)
+        library._finalize_final_module()
+        codegen._engine._defined_symbols.update(defined)
         return library
+
+    def _get_module_for_linking(self) -> Any:
+        """Return the code that another root links in."""
+        if self._from_cache and self._shared_module is None:
+            self._shared_module = llvm.parse_bitcode(self._bitcode)
+        return super()._get_module_for_linking()  # type: ignore[no-untyped-call]
+
+
+def _defined(module: Any) -> Iterator[str]:
+    """Yield the names that a module defines."""
+    for of in (module.functions, module.global_variables):
+        yield from (value.name for value in of if not value.is_declaration)
 
 
 def _defines(module: Any, name: str) -> bool:

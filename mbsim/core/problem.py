@@ -14,7 +14,8 @@ to the committed one before the run ends, but for codes from AT_ONCE on.
 |         |                        | caller of `advance` must act on, else 0                    |
 | rhs     | y, f (out)             | code; f = f(t, y), h after the last committed point        |
 | stable  | y, f   (h: tolerance)  | step of a method that has no error estimate                |
-| limit   | y, f                   | longest step that may be tried                             |
+| limit   | y, f                   | longest step that may be tried; less than 0 where steps    |
+|         |                        | behind it may be as long as they were before               |
 | project | y (in and out), -      | code; y back onto its manifold; h = ALONG: velocities in y |
 |         |                        | are displacements a time, and all that counts is what      |
 |         |                        | holds positions                                            |

@@ -23,7 +23,7 @@ def bind(
     table = pack(workspace)
     attempt, fit_dense = (jit.address(f, HOOK) for f in (scheme.attempt, scheme.fit_dense))
     context = int(table.ctypes.data)
-    numbers = (scheme.last, scheme.order, scheme.memory, scheme.implicit)
+    numbers = (scheme.last, scheme.order, scheme.memory, scheme.implicit, scheme.resumes)
     looks = jit.address(branches.serve, branches.ASKED) if problem.switching != 0 else 0
     locates = jit.address(events.serve, events.ASKED) if problem.happens != 0 else 0
     probes = jit.address(probe.attempt, HOOK) if probe is not None else 0

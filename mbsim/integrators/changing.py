@@ -162,8 +162,11 @@ def is_stiff(m: Method, h: float, t_end: float) -> bool:
 def is_calm(m: Method, context: int, probe: int, t_end: float) -> bool:
     """Try an explicit step now and then; return whether to change back, with a step to begin."""
     m.memory[IMPLICIT_STEPS] += 1.0
-    if m.memory[IMPLICIT_STEPS] % TRY_EVERY != 0.0:
+    taken = m.memory[IMPLICIT_STEPS]
+    # just behind a switch one tells of that alone
+    if taken < TRY_EVERY or (m.memory[WAS_CUT] == 1.0 and taken < 2.0 * TRY_EVERY):
         return False
+    m.memory[IMPLICIT_STEPS] = 0.0
     t, kept = m.memory[TIME], m.memory[LAST_ERROR]
     h = min(m.memory[STEP], t_end - t)
     if not h > 0.0:
@@ -180,8 +183,8 @@ def is_calm(m: Method, context: int, probe: int, t_end: float) -> bool:
     gain = -math.inf
     if part > 0.0:
         # of steps of this length, and no more time than they took: short ones are behind an event
-        each = IMPLICIT_WORK * work / TRY_EVERY
-        gain = (each - EVALUATIONS_A_STEP / part) * min((t - m.memory[BEGUN]) / h, TRY_EVERY)
+        each = IMPLICIT_WORK * work / taken
+        gain = (each - EVALUATIONS_A_STEP / part) * min((t - m.memory[BEGUN]) / h, taken)
     m.memory[BEGUN] = t
     m.memory[BEGUN_WORK] = m.counts[EVALUATIONS] + m.counts[JACOBIANS]
     # a short step, as after a change or a switch, is good for either method: one that is shorter

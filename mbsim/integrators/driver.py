@@ -163,18 +163,22 @@ def begin(p: Problem, m: Method, steps: Steps, t: float, t_end: float, h_max: fl
 @jitable
 def length(
     p: Problem, m: Method, steps: Steps, t: float, t_end: float, h_max: float, floor: float
-) -> float:
-    """Return the length of the step to try from t."""
+) -> tuple[float, float]:
+    """Return the length of the step to try from t, and that of those behind it as far as known."""
     h = min(m.memory[STEP], h_max)
+    behind = 0.0
     if steps.order > 0.0:
         limit = call_float(p.limit, (p.context, t, h, m.y, m.k[0]))
+        h = quantised(h)
+        if limit < 0.0:
+            limit, behind = -limit, h
         if steps.implicit:
             # in a shorter one velocities are rounding errors of positions over h
             limit = max(limit, LOCATED * max(m.memory[OWN_TIME], abs(t)))
-        h = min(quantised(h), limit)
+        h = min(h, limit)
     h = max(h, floor)
     # no sliver of a step before the end
-    return t_end - t if t + 1.01 * h >= t_end else h
+    return (t_end - t if t + 1.01 * h >= t_end else h), behind
 
 
 @jitable
@@ -391,7 +395,7 @@ def advance(  # noqa: C901
         if steps.order == 0.0 and t >= m.memory[FAILED_AT] and bound_is_due(m):
             m.memory[STEP] = stable(p, m, t, h_max)
             m.memory[STALE] = 0.0
-        whole = length(p, m, steps, t, t_end, h_max, floor)
+        whole, behind = length(p, m, steps, t, t_end, h_max, floor)
         most = min(whole, max(m.memory[HORIZON] - t, floor))
 
         # try
@@ -438,6 +442,8 @@ def advance(  # noqa: C901
             # error that they have themselves lets them
             factor = next_factor(uncut, 1.0, steps.order, steps.memory, False)
             m.memory[STEP] = max(m.memory[STEP], min(CUT_GROW, factor) * most)
+        if h < steps.resumes * behind:
+            m.memory[STEP] = max(m.memory[STEP], behind)
         m.memory[STEP] = max(m.memory[STEP], m.memory[CUT_FROM])
         m.memory[CUT_FROM] = 0.0
         if is_bounded(m) and not steps.implicit:

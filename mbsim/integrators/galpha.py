@@ -58,6 +58,7 @@ from mbsim.integrators.scheme import (
     FACTORIZATIONS,
     FRESH,
     HAVE_JACOBIAN,
+    HELD,
     LAST_ERROR,
     RETRY,
     TOL,
@@ -194,7 +195,8 @@ def estimate_error(p: Problem, m: Method, t: float, h: float) -> float:
     for i in range(len(m.y)):
         if m.kinds[i] == POSITION:
             e[i] = shift[i]
-    error = call_float(p.norm, (p.context, t, h, e, w)) / (PART * m.memory[TOL])
+    most = min(PART * m.memory[TOL], m.memory[HELD])
+    error = call_float(p.norm, (p.context, t, h, e, w)) / most
     rough = call_float(p.norm, (p.context, t, FRICTION_ALONE, e, w)) / ROUGH
     lost = call_float(p.norm, (p.context, h, IMPACTS_ALONE, e, w)) / (OF_IMPACT * m.memory[TOL])
     return max(error, max(rough, lost))
@@ -253,4 +255,7 @@ SCHEME = Scheme(
     implicit=True,
     carried=3,
     samples=4,
+    # what it damps of a fast vibration is by steps of one length: a long one after a shorter one
+    # feeds it
+    resumes=0.03,
 )

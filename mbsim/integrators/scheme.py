@@ -94,7 +94,9 @@ THIRD_AT = 54
 # its begin (`branches`); a part of it at which a force is on another branch, 0 for none, and how
 # much of it the load of what holds is known for
 LOOKS, LOAD_THEN, SWITCHED, REACH = range(55, 59)
-MEMORY = 59
+# the most that the error of a step of order 2 may be, whatever tol is
+HELD = 59
+MEMORY = 60
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
@@ -121,6 +123,9 @@ class Scheme(NamedTuple):
     pair: bool = False  # solves with complex coefficients as well
     watched: int = 0  # rows of k where AUTO watches it
     samples: int = 1  # parts of a step of others in which it sees as much, at the ends alone
+    # a step that is cut to less than this part, where a force in touch ends, tells nothing of the
+    # next one, which is as long as it was meant to be
+    resumes: float = 1.0
 
 
 @tags.state
@@ -160,6 +165,7 @@ class Steps(NamedTuple):
     order: float
     memory: float
     implicit: bool
+    resumes: float
     # what only some problems need, 0 for others: `branches.serve`, `events.serve`; of AUTO's
     # implicit method `attempt` of the explicit one, and `changing.serve` that tries it
     branches: int
@@ -180,6 +186,7 @@ def make(scheme: Scheme, y0: Any, t0: float, kinds: Any = None, rows: int = 1) -
     memory[H_SMALLEST] = memory[GROWTH] = math.inf
     memory[FAILED_AT] = t0
     memory[LEFT_PART] = LEFT
+    memory[HELD] = math.inf
     memory[ROW_ENDS] = memory[HORIZON] = memory[COSTLY] = math.inf
     counts = np.zeros(COUNTS, dtype=np.int64)
     counts[NEXT_WATCH] = np.iinfo(np.int64).max  # nobody watches

@@ -41,6 +41,10 @@ BEGIN_STEPS = 4 * FIRST_PATIENCE
 #: What that decides by are forces, over their limits: a few 1e-9 m of a stiff contact, far less
 #: than the error of a step, made it slip.
 LEFT_OF_STICKING = 3e-4
+#: And by which the error of a step of order 2 is bounded then, as at tol 1e-5: how far a body that
+#: is put down slips follows from its first milliseconds, 1e-5 m of which an error of 1e-6 m, far
+#: less than a loose tol, makes a tenth.
+HELD_BY_STICKING = 2e-6
 
 
 class Methods:
@@ -76,6 +80,7 @@ class Methods:
         self.arrays.memory[scheme.OWN_TIME] = length / speed
         if system.scene.contacts.rigid.any() or (system.scene.applied.equation >= 0).any():
             self.arrays.memory[scheme.LEFT_PART] = LEFT_OF_STICKING
+            self.arrays.memory[scheme.HELD] = HELD_BY_STICKING
         self.problem: Problem
         self.rigid: Any = None  # what a method with rigid contacts has of its own
         self._table: Any

@@ -9,6 +9,7 @@ import os
 import subprocess
 import sys
 
+import llvmlite.binding as llvm
 import numpy as np
 import pytest
 from numba import boolean, float64, int64, njit
@@ -113,6 +114,46 @@ def test_same_numbers_from_linked_roots_the_cache_and_numbas_own_linking(tmp_pat
     assert linked[:3] == cached[:3] == stock[:3]
     assert float.fromhex(linked[0]) == pytest.approx(120002.3, abs=0.1)  # 5! and odd
     assert float.fromhex(linked[1]) == pytest.approx(24102.3, abs=0.1)  # 4! and even
+
+
+NO_BITCODE = """
+import llvmlite.binding as llvm
+def parse_bitcode(data):
+    raise AssertionError("parsed")
+llvm.parse_bitcode = parse_bitcode
+"""
+
+
+def test_what_is_stored_is_loaded_without_its_bitcode(tmp_path):
+    """To parse it took nine tenths of the time to load a method."""
+    linked, cached = in_a_process(tmp_path), in_a_process(tmp_path, NO_BITCODE)
+    assert cached[:3] == linked[:3]
+    assert cached[7] == "False"
+
+
+@jitable
+def stored(x):
+    return 3.0 * x
+
+
+def test_a_stored_function_is_linked_into_another_root():
+    jit._register()
+    codegen = cpu_target.target_context.codegen()
+    compiled = njit(stored)
+    assert compiled(2.0) == 6.0
+    library = compiled.overloads[compiled.signatures[0]].library
+    library.enable_object_caching()
+    library._compiled_object = codegen._tm.emit_object(library._final_module)
+    again = linking.RootLibrary._unserialize(codegen, library.serialize_using_object_code())
+    assert again._shared_module is None
+    name = next(f.name for f in library.get_defined_functions())
+    assert again.get_pointer_to_function(name) != 0
+    root = codegen.create_library("root")
+    root.add_linking_library(again)
+    text = f'declare void @"{name}"()\ndefine ptr @asked() {{ ret ptr @"{name}" }}'
+    root._final_module.link_in(llvm.parse_assembly(text))
+    root.finalize()
+    assert {"asked", name} <= {f.name for f in root.get_defined_functions()}
 
 
 @jitable

@@ -55,15 +55,24 @@ def test_what_is_put_down_flat_slips_as_far_as_it_must(angle, margin, shape, tol
     assert late < 1e-9
 
 
+@pytest.mark.parametrize(("angle", "margin", "shape"), [(30, 1e-2, "box"), (20, 1e-2, "cylinder")])
+def test_galpha_tells_it_at_a_loose_tolerance(angle, margin, shape, tmp_path):
+    """Errors of 1 % of the tolerance made a fifth of the slip."""
+    body = Incline(math.radians(angle), margin, shape)
+    slip, late = slipped(tmp_path, body, body.flat(), 0.5, integrator="GALPHA", tol=1e-3)
+    assert slip == pytest.approx(planar(angle, margin, shape, 0.5), rel=0.05)
+    assert late < 1e-9
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("method", "tol"),
-    [("RADAU5", 1e-3), *((method, tol) for method in ("RADAU5", "GALPHA") for tol in (1e-5, 1e-7))],
+    [(method, tol) for method in ("RADAU5", "GALPHA") for tol in (1e-3, 1e-5, 1e-7)],
 )
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("angle", ANGLES)
 def test_and_at_all_margins(angle, shape, method, tol, tmp_path):
-    """At 1e-3 the slip, some 1e-5 m, is a hundredth of the tolerance; GALPHA is up to 31 % off."""
+    """At 1e-3 the slip, some 1e-5 m, is a hundredth of the tolerance."""
     for margin in MARGINS:
         body, end = Incline(math.radians(angle), margin, shape), 3.0 if margin < 1e-3 else 0.5
         slip, late = slipped(tmp_path, body, body.flat(), end, integrator=method, tol=tol)
@@ -80,7 +89,6 @@ def test_what_is_in_balance_stays(angle, shape, method, tmp_path):
     for margin in MARGINS:
         body = Incline(math.radians(angle), margin, shape)
         start = body.balanced()
-        # at 1e-3 GALPHA's normal forces are off by more than the least of the margins
-        for tol in (1e-3, 1e-5) if method == "RADAU5" else (1e-5,):
+        for tol in (1e-3, 1e-5):
             slip, _ = slipped(tmp_path, body, start, 1.0, integrator=method, tol=tol)
             assert abs(slip) < 1e-9, (margin, tol)

@@ -346,5 +346,9 @@ def longest_travel(scene: Scene, y: F1, f: F1, h: float) -> float:
 
 @jitable
 def longest_step(scene: Scene, y: F1, f: F1, h: float) -> float:
-    """Return how much of h may be tried: nothing passes through, no parting is leapt over."""
-    return min(longest_touching(scene, f, h), longest_travel(scene, y, f, h))
+    """Return how much of h may be tried: nothing passes through, no parting is leapt over.
+
+    Less than 0 where a force in touch bends or ends there: what is behind is no faster than before.
+    """
+    touching, travel = longest_touching(scene, f, h), longest_travel(scene, y, f, h)
+    return -touching if touching < min(h, travel) else min(touching, travel)

@@ -3,7 +3,16 @@
 from __future__ import annotations
 
 from mbsim.arrays.codes import AT_FAULT, USED_ROWS
-from mbsim.arrays.hooks import Contacts, Effects, FclPoints, Gauges, Recall, Stability, failure_or
+from mbsim.arrays.hooks import (
+    Contacts,
+    Effects,
+    FclPoints,
+    Gauges,
+    Recall,
+    Stability,
+    failure_or,
+    note_failure,
+)
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import vector_at, view
 from mbsim.core.arrays import F1, Pointer
@@ -18,6 +27,7 @@ from mbsim.dynamics.contact.points import commit_gaps, commit_incidents, keep_sl
 from mbsim.dynamics.contact.spreading import ask_over_patch
 from mbsim.dynamics.contact.tilting import damp_tilting
 from mbsim.dynamics.events.contact_stability import add_all_meeting, add_all_touching
+from mbsim.dynamics.events.effects import friction_left, impact_left, pressure_left
 from mbsim.dynamics.events.step_limits import longest_step
 from mbsim.dynamics.pipeline.audit import (
     examine_friction,
@@ -31,8 +41,6 @@ from mbsim.dynamics.pipeline.output import (
     fill_contacts,
     fill_incidents,
     find_fault,
-    friction_left,
-    impact_left,
 )
 
 
@@ -159,6 +167,13 @@ def measure_effects(context: int, what: int, t: float, h: float, a: Pointer, b: 
     e, y = vector_at(a, n), vector_at(b, n)
     if what == Effects.IMPACT:
         return impact_left(scene, t, e, y)
+    if what == Effects.PRESSURE:
+        # laws are explored, not asked: what failed before stays
+        failed = failure_or(scene, 0)
+        largest = pressure_left(scene, e, y)
+        failure_or(scene, 0)
+        note_failure(scene, failed)
+        return largest
     return friction_left(scene, e, y, what == Effects.REVERSAL)
 
 

@@ -125,9 +125,10 @@ def limit_turn(context: int, t: float, h: float, a: Pointer, b: Pointer) -> floa
     longest = h
     if scene.world.hooks[Hook.GAUGES] != 0:
         longest = call_float(scene.world.hooks[Hook.GAUGES], (scene, Gauges.STEP, t, h, a, b))
-    longest = longest_turn(scene, longest)
-    halt = scene.sweep.quality[FOLD_HALT]
-    return min(longest, halt - t) if halt > t else longest
+    turn, halt = longest_turn(scene, abs(longest)), scene.sweep.quality[FOLD_HALT]
+    if halt > t:
+        turn = min(turn, halt - t)
+    return turn if turn < abs(longest) else longest
 
 
 def serve_element(context: int, t: float, y: Pointer, element: int, component: int) -> int:

@@ -199,7 +199,7 @@ def _limit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     else:
         longest = h
     halt = scene.sweep.quality[FOLD_HALT]
-    return min(longest, halt - t) if halt > t else longest
+    return halt - t if 0.0 < halt - t < abs(longest) else longest
 
 
 def _output(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
