@@ -43,13 +43,18 @@ KEPT_COLUMNS = 26
 # and changes of position do not count; what the solver may leave of a velocity, times h
 FIXED, SLOP, LEFT = range(3)
 PLAN_NUMBERS = 3
-# entries of `Tally.number`, of the last step tried: what the solver left, as a velocity; its length
-RESIDUAL, STEP_LENGTH = range(2)
-TALLY_NUMBERS = 2
+# entries of `Tally.number`, of the last step tried: what the solver left, as a velocity; its
+# length; the contact that closed fastest in it, and by how much within its length; how far its end
+# is from that of two halves, and its middle from the state between them; when it ended, once it
+# was taken
+RESIDUAL, STEP_LENGTH, FASTEST, CLOSED, END_OFF, ROWS_OFF, ENDED = range(7)
+TALLY_NUMBERS = 7
 # entries of `Tally.count`: contact points, points that press, sweeps so far, steps tried so far,
-# steps that were left unsolved, steps with positions projected, Newton iterations so far
+# steps that were left unsolved, steps with positions projected, Newton iterations so far, points
+# so far, steps of the deck's length that were compared with two halves
 POINTS, PRESSING, ALL_SWEEPS, ALL_STEPS, UNSOLVED, PROJECTED, NEWTONS, ALL_POINTS = range(8)
-TALLY_COUNTS = 8
+COMPARED = 8
+TALLY_COUNTS = 9
 
 
 @tags.constant
@@ -81,6 +86,7 @@ class Motion(NamedTuple):
     part: F1  # (nb + 1,) of `before` in that, the rest being v's
     reach: F1  # (ng,) how far a graphic may come in the step
     slope: F1  # (ny,) y'
+    half: F2  # (2, ny) states of a step's two halves, where it is compared with them
 
 
 @tags.scratch
@@ -125,6 +131,7 @@ class Tally(NamedTuple):
 
     number: F1  # (TALLY_NUMBERS,)
     count: I1  # type: ignore[assignment]  # (TALLY_COUNTS,)
+    deepest: F1  # (nc,) depth of each contact at the begins of the parts of the step tried last
 
 
 class Stepping(NamedTuple):
@@ -157,6 +164,7 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int]) -> Stepping
         part=numbers(nb + 1),
         reach=numbers(ng),
         slope=numbers(ny),
+        half=numbers(2, ny),
     )
     points = Points(
         slot=whole(m),
@@ -182,5 +190,5 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int]) -> Stepping
     )
     room = 1 << max(4, int(4 * m - 1).bit_length())
     kept = Kept(whole(1), whole(m), np.zeros((m, KEPT_COLUMNS)), whole(room))
-    tally = Tally(np.zeros(TALLY_NUMBERS), whole(TALLY_COUNTS))
+    tally = Tally(np.zeros(TALLY_NUMBERS), whole(TALLY_COUNTS), np.zeros(len(rules.number)))
     return Stepping(rules, plan, motion, points, kept, tally)

@@ -62,6 +62,7 @@ def add_row(scene: Scene, S: Stepping, pair: int, s: int, reach: float) -> bool:
     if k == len(P.slot):
         return False
     S.tally.count[POINTS] = k + 1
+    S.tally.deepest[c] = max(S.tally.deepest[c], depth)
     gi, gj = sides(scene, s)
     P.slot[k], P.contact[k], P.gap[k] = s, c, -depth
     P.body[k, 0], P.body[k, 1] = scene.graphics.body[gi], scene.graphics.body[gj]

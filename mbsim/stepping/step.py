@@ -206,7 +206,7 @@ def coefficient(S: Stepping, c: int, slip: float) -> float:
 def look_ahead(S: Stepping, k: int, h: float) -> float:
     """Fill what the normal velocity of point k is held above; return the part before an impact.
 
-    That is 0 where there is no restitution: then the gap is all that may close. Else the point
+    That is NO_IMPACT where there is no restitution: the gap is all that may close. Else the point
     comes in at u, and leaves at e u; what accelerates it goes on behind the impact.
     """
     P, M, rule = S.points, S.motion, S.rules.number[S.points.contact[k]]
@@ -217,9 +217,9 @@ def look_ahead(S: Stepping, k: int, h: float) -> float:
     if gap + h * mean >= 0.0:
         # it does not close by itself
         P.ahead[k] = max(P.ahead[k], -free)
-        return 0.0
+        return NO_IMPACT
     if rule[RESTITUTION] == 0.0 or before >= -max(rule[SLOWEST], NOISE * S.plan.number[LEFT] / h):
-        return 0.0
+        return NO_IMPACT
     part = min(max(gap, 0.0) / (h * -mean), 1.0)
     comes = before + part * (free - before)
     leaves = -rule[RESTITUTION] * comes + (1.0 - part) * (free - before)
@@ -244,10 +244,9 @@ def prepare_points(scene: Scene, S: Stepping, y: F1, h: float) -> None:
     recall(S, h)
     for k in range(count):
         part = look_ahead(S, k, h)
-        if part > 0.0:
-            for side in range(2):
-                b = P.body[k, side]
-                M.part[b] = min(M.part[b], part)
+        for side in range(2):
+            b = P.body[k, side]
+            M.part[b] = min(M.part[b], part)
         if P.r[k, 0] > 0.0:
             r = (P.r[k, 0], P.r[k, 1], P.r[k, 2])
             apply(P.answer, k, M.v, P.body[k, 0], P.body[k, 1], r)
@@ -323,7 +322,7 @@ def add_losses(scene: Scene, S: Stepping, new: F1) -> None:
 
 
 @jitable
-def solve_step(scene: Scene, S: Stepping, h: float) -> int:
+def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
     """Find impulses and displacements of the points at hand; return 0 or a code."""
     P, M, tally = S.points, S.motion, S.tally
     count, nb = tally.count[POINTS], len(scene.bodies.mass)
@@ -341,7 +340,9 @@ def solve_step(scene: Scene, S: Stepping, h: float) -> int:
             M.shift[b, c] = M.part[b] * M.before[b, c] + (1.0 - M.part[b]) * M.v[b, c]
     pushes = project_positions(P, M.shift, count, h, slop)
     number = tally.number
-    number[RESIDUAL], number[STEP_LENGTH] = left, h
+    # of two halves that make one step the worse one counts
+    number[RESIDUAL] = left if committed else max(left, number[RESIDUAL])
+    number[STEP_LENGTH] = h
     tally.count[ALL_SWEEPS] += sweeps
     tally.count[ALL_STEPS] += 1
     tally.count[ALL_POINTS] += count
@@ -360,6 +361,9 @@ def take_step(
 ) -> int:
     """Fill the state a step h after (t, y); return 0 or a code."""
     dy = S.motion.slope
+    if committed:
+        for c in range(len(S.tally.deepest)):
+            S.tally.deepest[c] = 0.0
     code = find_forces(scene, t, y, dy)
     if code != 0:
         return code
@@ -371,7 +375,7 @@ def take_step(
     if code != 0:
         return code
     prepare_points(scene, S, y, h)
-    code = solve_step(scene, S, h)
+    code = solve_step(scene, S, h, committed)
     if code != 0:
         return code
     for k in range(BODY_SIZE * len(scene.bodies.mass), len(y)):
