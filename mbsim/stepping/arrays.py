@@ -40,9 +40,10 @@ RULE_NUMBERS = 4
 KEPT_POINT, KEPT_NORMAL, KEPT_TANGENT, KEPT_FORCE = 14, 17, 20, 23
 KEPT_COLUMNS = 26
 # entries of `Plan.number`: 1 where the error of steps is not estimated; lengths below which gaps
-# and changes of position do not count; what the solver may leave of a velocity, times h
-FIXED, SLOP, LEFT = range(3)
-PLAN_NUMBERS = 3
+# and changes of position do not count; what the solver may leave of a velocity, times h; 1 where
+# some kind of pair is not near
+FIXED, SLOP, LEFT, SOME_AHEAD = range(4)
+PLAN_NUMBERS = 4
 # entries of `Tally.number`, of the last step tried: what the solver left, as a velocity; its
 # length; the contact that closed fastest in it, and by how much within its length; how far its end
 # is from that of two halves, and its middle from the state between them; when it ended, once it
@@ -85,7 +86,11 @@ class Motion(NamedTuple):
     shift: F2  # (nb + 1, 6) displacement over the step's length
     part: F1  # (nb + 1,) of `before` in that, the rest being v's
     reach: F1  # (ng,) how far a graphic may come in the step
+    went: F1  # (ng,) how far it goes by what impulses give
     slope: F1  # (ny,) y'
+    way: F2  # (2, 6) velocities of the bodies of a pair that is moved ahead
+    frames: F2  # (2, 12) of its graphics at the step's begin
+    taken: I1  # (pairs + 1,) the try of a step in which a pair has points by that; last: this one
     half: F2  # (2, ny) states of a step's two halves, where it is compared with them
 
 
@@ -101,6 +106,7 @@ class Points(NamedTuple):
     was: I1  # (m,) row of `Kept` that is the same point, -1 for none
     gap: F1  # (m,)
     point: F2  # (m, 3)
+    arm: F3  # (m, 2, 3) from the bodies' cg, when the point touches
     normal: F2  # (m, 3)
     tangent: F2  # (m, 3)
     H: F4  # (m, 2, 3, 6) velocity along (n, x, y) by those of the bodies
@@ -145,9 +151,9 @@ class Stepping(NamedTuple):
     tally: Tally
 
 
-def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int]) -> Stepping:
-    """Return empty arrays for so many bodies, graphics, numbers of y and contact points."""
-    nb, ng, ny, m = sizes
+def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int]) -> Stepping:
+    """Return empty arrays for so many bodies, graphics, numbers of y, contact points and pairs."""
+    nb, ng, ny, m, pairs = sizes
 
     def whole(*shape: int) -> np.ndarray:
         return np.zeros(shape, dtype=np.int64)
@@ -163,7 +169,11 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int]) -> Stepping
         shift=numbers(nb + 1, 6),
         part=numbers(nb + 1),
         reach=numbers(ng),
+        went=numbers(ng),
         slope=numbers(ny),
+        way=numbers(2, 6),
+        frames=numbers(2, 12),
+        taken=whole(pairs + 1),
         half=numbers(2, ny),
     )
     points = Points(
@@ -175,6 +185,7 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int]) -> Stepping
         was=whole(m),
         gap=numbers(m),
         point=numbers(m, 3),
+        arm=numbers(m, 2, 3),
         normal=numbers(m, 3),
         tangent=numbers(m, 3),
         H=numbers(m, 2, 3, 6),

@@ -19,7 +19,7 @@ from mbsim.dynamics.pipeline.output import no_room, scaled_error
 from mbsim.stepping.arrays import FIXED, Stepping
 from mbsim.stepping.audit import examine_row, examine_step
 from mbsim.stepping.halves import take_fixed_step
-from mbsim.stepping.points import commit_distances
+from mbsim.stepping.pairs import commit_distances
 from mbsim.stepping.rows import (
     add_lost,
     fill_contacts,

@@ -24,6 +24,7 @@ from mbsim.stepping.arrays import (
     PLAN_NUMBERS,
     PROJECTED,
     SLOP,
+    SOME_AHEAD,
     UNSOLVED,
     Plan,
     Stepping,
@@ -56,7 +57,21 @@ COMPLIANT = frozenset(
     }
 )
 #: Pairs whose rows are features that may meet where the shapes are apart too.
-APART = frozenset({"SPHERE-PLANE", "SPHERE-SPHERE", "SPHERE-BOX", "BOX-PLANE", "ELLIPSOID-PLANE"})
+APART = frozenset(
+    {
+        "SPHERE-PLANE",
+        "SPHERE-SPHERE",
+        "SPHERE-BOX",
+        "SPHERE-CYLINDER",
+        "SPHERE-FRUSTUM",
+        "SPHERE-MESH",
+        "BOX-PLANE",
+        "CYLINDER-PLANE",
+        "FRUSTUM-PLANE",
+        "ELLIPSOID-PLANE",
+        "MESH-PLANE",
+    }
+)
 #: Contact points of a body at most, in the mean.
 POINTS_EACH = 64
 #: A gap, or what a position changes by, counts from this part of tol L on; what the solver may
@@ -103,6 +118,7 @@ def _plan(system: System, fixed: bool, tol: float) -> Plan:
     number = np.zeros(PLAN_NUMBERS)
     length = float(scene.world.scale[SCALE_LENGTH])
     number[FIXED] = float(fixed)
+    number[SOME_AHEAD] = float(not near.all())
     number[SLOP], number[LEFT] = COUNTS * tol * length, LEAVES * tol * length
     return Plan(number, near, rows)
 
@@ -119,18 +135,23 @@ def rigid_mechanism(system: System, fixed: bool, tol: float) -> Made:
 
     scene = system.scene
     for kind in system.plans.kinds:
+        why = ""
         if _is_patch(kind):
+            why = "touch in patches of triangles, which are no contact points"
+        elif not kind.closed_form:
+            why = "are measured by FCL, which says nothing of how far they are apart"
+        if why:
             contact = system.model.contacts[kind.contact]
             raise ModelError(
                 f"{system.model.file}:{contact.source.line}: Force_Contact[{contact.id}]: "
-                f"integrator MOREAU cannot run this: {kind.shape_i} on {kind.shape_j} touch in "
-                "patches of triangles, which are no contact points; take AUTO"
+                f"integrator MOREAU cannot run this: {kind.shape_i} on {kind.shape_j} {why}; "
+                "take AUTO"
             )
     found = Coefficients(system)
     plan = _plan(system, fixed, tol)
     nb = len(scene.bodies.mass)
     capacity = min(len(scene.slots.pair), POINTS_EACH * (nb + 4))
-    sizes = nb, len(scene.graphics.body), scene.rows.y.shape[1], capacity
+    sizes = nb, len(scene.graphics.body), scene.rows.y.shape[1], capacity, len(scene.pairs.kind)
     stepping = make(found.rules, plan, sizes)
     inner, outer = pack(stepping), pack(scene)
     scene.world.hooks[Hook.STEPPING] = int(inner.ctypes.data)

@@ -60,7 +60,8 @@ from mbsim.stepping.arrays import (
     Stepping,
 )
 from mbsim.stepping.kept import index_kept, recall
-from mbsim.stepping.points import fill_point, fill_reach, find_points
+from mbsim.stepping.pairs import find_missed, find_points
+from mbsim.stepping.points import fill_point, fill_reach
 from mbsim.stepping.solver import (
     apply,
     project_positions,
@@ -74,6 +75,9 @@ NOISE = 30.0
 MOST_SPINS = 12
 #: How much farther than a step can come near pairs are looked for.
 ROOM = 4.0
+#: How often a step's contact problem is solved at most, each time with what bodies hit that the
+#: impulses threw at it.
+MOST_ATTEMPTS = 4
 #: Of `Motion.part`: no impact with restitution.
 NO_IMPACT = 2.0
 
@@ -228,12 +232,12 @@ def look_ahead(S: Stepping, k: int, h: float) -> float:
 
 
 @jitable
-def prepare_points(scene: Scene, S: Stepping, y: F1, h: float) -> None:
+def prepare_points(scene: Scene, S: Stepping, h: float) -> None:
     """Fill all that the solver takes, impulses as the last step had them, and velocities so."""
     P, M, nb = S.points, S.motion, len(scene.bodies.mass)
     count = S.tally.count[POINTS]
     for k in range(count):
-        fill_point(scene, S, y, k)
+        fill_point(scene, S, k)
         i, j = P.body[k, 0], P.body[k, 1]
         x, z = velocity_of(P.H, k, 1, M.before, i, j), velocity_of(P.H, k, 2, M.before, i, j)
         P.mu[k] = coefficient(S, P.contact[k], math.hypot(x, z))
@@ -374,10 +378,18 @@ def take_step(
     code = find_points(scene, S, y, h, committed)
     if code != 0:
         return code
-    prepare_points(scene, S, y, h)
-    code = solve_step(scene, S, h, committed)
-    if code != 0:
-        return code
+    for attempt in range(MOST_ATTEMPTS):
+        prepare_points(scene, S, h)
+        code = solve_step(scene, S, h, committed)
+        if code != 0:
+            return code
+        missed = 0
+        if S.tally.count[PRESSING] > 0 and attempt < MOST_ATTEMPTS - 1:
+            missed = find_missed(scene, S, y, h)
+        if missed < 0:
+            return -missed
+        if missed == 0:
+            break
     for k in range(BODY_SIZE * len(scene.bodies.mass), len(y)):
         new[k] = y[k] + h * dy[k]
     move_bodies(scene, S, y, h, new)
