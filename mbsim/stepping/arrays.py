@@ -73,6 +73,9 @@ class Plan(NamedTuple):
     number: F1  # (PLAN_NUMBERS,)
     near: I1  # (nk,) 1 where rows of a kind of pair that are apart are points of contact
     rows: I1  # (nk,) rows of a kind of pair, from its first slot on
+    group: I1  # (nb + 1,) of bodies that joints hold together, -1 for free ones and ground
+    members: I1  # (nb,) those bodies, group by group
+    first: I1  # (groups + 1,) of each group's
 
 
 @tags.scratch
@@ -91,6 +94,9 @@ class Motion(NamedTuple):
     way: F2  # (2, 6) velocities of the bodies of a pair that is moved ahead
     frames: F2  # (2, 12) of its graphics at the step's begin
     taken: I1  # (pairs + 1,) the try of a step in which a pair has points by that; last: this one
+    least: F1  # (groups,) `part` of each group
+    impulse: F1  # (ny,) impulses on bodies, then what they change of velocities
+    middle: F1  # (ny,) state in the midst of a step
     half: F2  # (2, ny) states of a step's two halves, where it is compared with them
 
 
@@ -110,7 +116,11 @@ class Points(NamedTuple):
     normal: F2  # (m, 3)
     tangent: F2  # (m, 3)
     H: F4  # (m, 2, 3, 6) velocity along (n, x, y) by those of the bodies
-    answer: F4  # (m, 2, 6, 3) velocities of the bodies by r
+    answer: F4  # (m, 2, 6, 3) velocities of the bodies by r, where joints hold neither
+    wide: I1  # (m,) else first row of `moved`, -1 where they do not
+    many: I1  # (m,) its rows there
+    moved: I1  # (wide rows,) bodies that r moves
+    moves: F3  # (wide rows, 6, 3) their velocities by r
     W: F3  # (m, 3, 3) u by r
     mu: F1  # (m,)
     ahead: F1  # (m,) u_n + ahead >= 0 where the point closes
@@ -151,9 +161,12 @@ class Stepping(NamedTuple):
     tally: Tally
 
 
-def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int]) -> Stepping:
-    """Return empty arrays for so many bodies, graphics, numbers of y, contact points and pairs."""
-    nb, ng, ny, m, pairs = sizes
+def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int]) -> Stepping:
+    """Return empty arrays.
+
+    `sizes` are the numbers of bodies, graphics, numbers of y, contact points, pairs, wide rows.
+    """
+    nb, ng, ny, m, pairs, wide = sizes
 
     def whole(*shape: int) -> np.ndarray:
         return np.zeros(shape, dtype=np.int64)
@@ -174,6 +187,9 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int]) -> Ste
         way=numbers(2, 6),
         frames=numbers(2, 12),
         taken=whole(pairs + 1),
+        least=numbers(len(plan.first)),
+        impulse=numbers(ny),
+        middle=numbers(ny),
         half=numbers(2, ny),
     )
     points = Points(
@@ -190,6 +206,10 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int]) -> Ste
         tangent=numbers(m, 3),
         H=numbers(m, 2, 3, 6),
         answer=numbers(m, 2, 6, 3),
+        wide=whole(m),
+        many=whole(m),
+        moved=whole(wide),
+        moves=numbers(wide, 6, 3),
         W=numbers(m, 3, 3),
         mu=numbers(m),
         ahead=numbers(m),

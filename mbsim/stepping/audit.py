@@ -115,4 +115,5 @@ def examine_step(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> None:
         tally[USUAL_ENERGY] = max(tally[USUAL_ENERGY], energy)
     if scene.world.hooks[Hook.JOINTS] != 0:
         joints = scene.world.hooks[Hook.JOINTS]
+        note_failure(scene, call_int(joints, (scene, Joints.READY, t, y, y)))
         note_failure(scene, call_int(joints, (scene, Joints.AUDIT, t, y, y)))

@@ -10,7 +10,9 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import AUDIT_TOL, FOUND_ALLOWED, FOUND_VALUE, STEP_END
+from mbsim.arrays.hooks import Hook, Joints
 from mbsim.arrays.scene import Scene
+from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import AT_Q, AT_V, BODY_SIZE
@@ -89,20 +91,32 @@ def fill_middle(S: Stepping, h: float, y: F1, new: F1, out: F1) -> None:
 
 
 @jitable
+def take_part(
+    scene: Scene, S: Stepping, t: float, h: float, y: F1, new: F1, committed: bool
+) -> int:
+    """Take a step as `take_step` does, and bring it back onto joints; return 0 or a code."""
+    code = take_step(scene, S, t, h, y, new, committed)
+    joints = scene.world.hooks[Hook.JOINTS]
+    if code == 0 and joints != 0:
+        code = call_int(joints, (scene, Joints.PROJECT, t + h, new, new))
+    return code
+
+
+@jitable
 def take_fixed_step(scene: Scene, S: Stepping, t: float, h: float, y: F1, new: F1) -> int:
     """Fill the state a step h after (t, y), and how far impacts leave it off; return 0 or a code.
 
     The step is taken anew behind its halves: what it leaves is that of the whole step.
     """
     number, half = S.tally.number, S.motion.half
-    code = take_step(scene, S, t, h, y, new, True)
+    code = take_part(scene, S, t, h, y, new, True)
     number[END_OFF] = number[ROWS_OFF] = 0.0
     if code != 0 or not is_doubtful(scene, S, h):
         return code
     S.tally.count[COMPARED] += 1
-    code = take_step(scene, S, t, 0.5 * h, y, half[0], True)
+    code = take_part(scene, S, t, 0.5 * h, y, half[0], True)
     if code == 0:
-        code = take_step(scene, S, t + 0.5 * h, 0.5 * h, half[0], half[1], False)
+        code = take_part(scene, S, t + 0.5 * h, 0.5 * h, half[0], half[1], False)
     if code != 0:
         return code
     end, rows = 0.0, 0.0
@@ -112,4 +126,4 @@ def take_fixed_step(scene: Scene, S: Stepping, t: float, h: float, y: F1, new: F
     for b in range(len(scene.bodies.mass)):
         rows = max(rows, distance(scene, b, half[1], half[0]))
     number[END_OFF], number[ROWS_OFF] = end, rows
-    return take_step(scene, S, t, h, y, new, True)
+    return take_part(scene, S, t, h, y, new, True)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.hooks import Hook, Joints, note_failure
 from mbsim.arrays.scene import Scene
+from mbsim.core.address import call_int
 from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import any_tangent, cross, norm, vector
@@ -135,8 +137,83 @@ def put_side(scene: Scene, S: Stepping, k: int, side: int, axes: tuple[V3, V3, V
 
 
 @jitable
-def fill_point(scene: Scene, S: Stepping, k: int) -> None:
-    """Fill H, the answers to impulses, W and the closing speed of point k."""
+def add_moved(S: Stepping, k: int, b: int) -> bool:
+    """Let body b be one that point k moves; False if there is no room."""
+    P = S.points
+    row = P.wide[k] + P.many[k]
+    if row >= len(P.moved):
+        return False
+    P.moved[row] = b
+    P.many[k] += 1
+    return True
+
+
+@jitable
+def list_moved(S: Stepping, k: int) -> bool:
+    """Fill which bodies point k moves, behind those of the points before; False if no room."""
+    P, plan = S.points, S.plan
+    P.many[k] = 0
+    i, j = P.body[k, 0], P.body[k, 1]
+    for side in range(2):
+        b = i if side == 0 else j
+        g = plan.group[b]
+        if g < 0:
+            if b < len(S.motion.inverse) and not add_moved(S, k, b):
+                return False
+            continue
+        if side == 1 and g == plan.group[i]:
+            continue
+        for m in range(plan.first[g], plan.first[g + 1]):
+            if not add_moved(S, k, plan.members[m]):
+                return False
+    return True
+
+
+@jitable
+def widen(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
+    """Fill what impulses at point k do where joints hold its bodies, as rows from `begin` on.
+
+    Return False if there is no room.
+    """
+    P, plan, impulse = S.points, S.plan, S.motion.impulse
+    P.wide[k] = -1
+    if plan.group[P.body[k, 0]] < 0 and plan.group[P.body[k, 1]] < 0:
+        return True
+    P.wide[k] = begin
+    if not list_moved(S, k):
+        return False
+    for a in range(3):
+        for b in range(6 * len(S.motion.inverse)):
+            impulse[b] = 0.0
+        for side in range(2):
+            b = P.body[k, side]
+            if plan.group[b] >= 0:
+                for c in range(6):
+                    impulse[6 * b + c] += P.H[k, side, a, c]
+        joints = scene.world.hooks[Hook.JOINTS]
+        note_failure(scene, call_int(joints, (scene, Joints.IMPULSE, 0.0, impulse, impulse)))
+        for row in range(begin, begin + P.many[k]):
+            b = P.moved[row]
+            side = 0 if b == P.body[k, 0] else 1
+            for c in range(6):
+                held = plan.group[b] >= 0
+                P.moves[row, c, a] = impulse[6 * b + c] if held else P.answer[k, side, c, a]
+    # what its own bodies do
+    for row in range(begin, begin + P.many[k]):
+        for side in range(2):
+            if P.moved[row] == P.body[k, side]:
+                for c in range(6):
+                    for a in range(3):
+                        P.answer[k, side, c, a] = P.moves[row, c, a]
+    return True
+
+
+@jitable
+def fill_point(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
+    """Fill H, the answers to impulses, W and the closing speed of point k; False if no room.
+
+    `begin` is the first of the wide rows that are not in use.
+    """
     P, M = S.points, S.motion
     n, x = vector(P.normal[k]), vector(P.tangent[k])
     z = cross(n, x)
@@ -148,6 +225,8 @@ def fill_point(scene: Scene, S: Stepping, k: int) -> None:
         1,
         ((-n[0], -n[1], -n[2]), (-x[0], -x[1], -x[2]), (-z[0], -z[1], -z[2])),
     )
+    if not widen(scene, S, k, begin):
+        return False
     i, j = P.body[k, 0], P.body[k, 1]
     for a in range(3):
         for c in range(3):
@@ -160,3 +239,4 @@ def fill_point(scene: Scene, S: Stepping, k: int) -> None:
     for d in range(6):
         u += P.H[k, 0, 0, d] * M.before[i, d] + P.H[k, 1, 0, d] * M.before[j, d]
     P.closing[k] = u
+    return True

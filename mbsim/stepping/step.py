@@ -181,7 +181,10 @@ def fill_motion(scene: Scene, S: Stepping, y: F1, h: float) -> None:
         for c in range(3):
             before[c], before[3 + c] = y[at + AT_V + c], w[c]
             free[c] = y[at + AT_V + c] + h * dy[at + AT_V + c]
-        w = spin_freely(scene, y, b, h)
+        if scene.tree.of_body[b] >= 0:
+            w = add(w, scale(h, rotate(R, vector(dy[at + AT_W :]))))
+        else:
+            w = spin_freely(scene, y, b, h)
         for c in range(3):
             free[3 + c] = w[c]
         for r in range(3):
@@ -232,37 +235,49 @@ def look_ahead(S: Stepping, k: int, h: float) -> float:
 
 
 @jitable
-def prepare_points(scene: Scene, S: Stepping, h: float) -> None:
-    """Fill all that the solver takes, impulses as the last step had them, and velocities so."""
-    P, M, nb = S.points, S.motion, len(scene.bodies.mass)
-    count = S.tally.count[POINTS]
+def prepare_points(scene: Scene, S: Stepping, h: float) -> int:
+    """Fill all that the solver takes, impulses as the last step had them, and velocities so.
+
+    Return 0 or a code.
+    """
+    P, M = S.points, S.motion
+    count, begin = S.tally.count[POINTS], 0
     for k in range(count):
-        fill_point(scene, S, k)
+        if not fill_point(scene, S, k, begin):
+            return Code.NO_ROOM
+        begin += P.many[k] if P.wide[k] >= 0 else 0
         i, j = P.body[k, 0], P.body[k, 1]
         x, z = velocity_of(P.H, k, 1, M.before, i, j), velocity_of(P.H, k, 2, M.before, i, j)
         P.mu[k] = coefficient(S, P.contact[k], math.hypot(x, z))
-    for b in range(nb + 1):
+    recall(S, h)
+    return 0
+
+
+@jitable
+def start_impulses(S: Stepping, h: float, ground: int) -> None:
+    """Fill what impulses have to bring about, and velocities with them as they stand."""
+    P, M = S.points, S.motion
+    for b in range(ground + 1):
         M.part[b] = NO_IMPACT
         for c in range(6):
             M.v[b, c] = M.free[b, c]
-    recall(S, h)
-    for k in range(count):
+    for k in range(S.tally.count[POINTS]):
         part = look_ahead(S, k, h)
         for side in range(2):
             b = P.body[k, side]
             M.part[b] = min(M.part[b], part)
         if P.r[k, 0] > 0.0:
             r = (P.r[k, 0], P.r[k, 1], P.r[k, 2])
-            apply(P.answer, k, M.v, P.body[k, 0], P.body[k, 1], r)
+            apply(P, k, M.v, r)
 
 
 @jitable
 def spread_parts(S: Stepping, count: int, h: float, slop: float, ground: int) -> None:
-    """Find the bodies that a contact stops in the step, and all that press on them.
+    """Find the bodies that a contact stops in the step, all that press on them, and joints hold.
 
     Between two bodies of different parts a contact that stays closed would open or go deeper.
     """
-    P, M = S.points, S.motion
+    P, M, plan = S.points, S.motion, S.plan
     for b in range(ground + 1):
         if M.part[b] == NO_IMPACT:
             M.part[b] = 0.5
@@ -283,6 +298,15 @@ def spread_parts(S: Stepping, count: int, h: float, slop: float, ground: int) ->
             if M.part[i] != M.part[j]:
                 M.part[i] = M.part[j] = min(M.part[i], M.part[j])
                 changed = True
+        for g in range(len(plan.first) - 1):
+            least, most = math.inf, 0.0
+            for m in range(plan.first[g], plan.first[g + 1]):
+                least = min(least, M.part[plan.members[m]])
+                most = max(most, M.part[plan.members[m]])
+            if most > least:
+                changed = True
+                for m in range(plan.first[g], plan.first[g + 1]):
+                    M.part[plan.members[m]] = least
 
 
 @jitable
@@ -330,6 +354,7 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
     """Find impulses and displacements of the points at hand; return 0 or a code."""
     P, M, tally = S.points, S.motion, S.tally
     count, nb = tally.count[POINTS], len(scene.bodies.mass)
+    start_impulses(S, h, nb)
     slop = S.plan.number[SLOP]
     allowed = S.plan.number[LEFT] / h
     left, sweeps = 0.0, 0
@@ -360,6 +385,49 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
 
 
 @jitable
+def solve_by_middle(scene: Scene, S: Stepping, t: float, h: float, y: F1, committed: bool) -> int:
+    """Solve the step with forces and accelerations as they are in its midst; return 0 or a code.
+
+    Where that is follows from the step with those of its begin: what rests then stays there.
+    """
+    M, middle, dy = S.motion, S.motion.middle, S.motion.slope
+    for k in range(BODY_SIZE * len(scene.bodies.mass), len(y)):
+        middle[k] = y[k] + 0.5 * h * dy[k]
+    for b in range(len(scene.bodies.mass)):
+        for c in range(6):
+            # of velocities alone: the displacement is that of `shift`
+            M.v[b, c] = 0.5 * (M.before[b, c] + M.v[b, c])
+    move_bodies(scene, S, y, 0.5 * h, middle)
+    code = find_forces(scene, t + 0.5 * h, middle, dy)
+    if code != 0:
+        return code
+    place_bodies(scene, y)
+    fill_motion(scene, S, y, h)
+    return solve_step(scene, S, h, committed)
+
+
+@jitable
+def solve_all(scene: Scene, S: Stepping, t: float, h: float, y: F1, committed: bool) -> int:
+    """Solve the step with all points that its motion reaches; return 0 or a code."""
+    for attempt in range(MOST_ATTEMPTS):
+        code = prepare_points(scene, S, h)
+        if code == 0:
+            code = solve_step(scene, S, h, committed)
+        if code != 0:
+            return code
+        missed = 0
+        if S.tally.count[PRESSING] > 0 and attempt < MOST_ATTEMPTS - 1:
+            missed = find_missed(scene, S, y, h)
+        if missed < 0:
+            return -missed
+        if missed == 0:
+            break
+    if scene.world.hooks[Hook.APPLIED] != 0 or scene.world.hooks[Hook.JOINTS] != 0:
+        return solve_by_middle(scene, S, t, h, y, committed)
+    return 0
+
+
+@jitable
 def take_step(
     scene: Scene, S: Stepping, t: float, h: float, y: F1, new: F1, committed: bool
 ) -> int:
@@ -378,18 +446,9 @@ def take_step(
     code = find_points(scene, S, y, h, committed)
     if code != 0:
         return code
-    for attempt in range(MOST_ATTEMPTS):
-        prepare_points(scene, S, h)
-        code = solve_step(scene, S, h, committed)
-        if code != 0:
-            return code
-        missed = 0
-        if S.tally.count[PRESSING] > 0 and attempt < MOST_ATTEMPTS - 1:
-            missed = find_missed(scene, S, y, h)
-        if missed < 0:
-            return -missed
-        if missed == 0:
-            break
+    code = solve_all(scene, S, t, h, y, committed)
+    if code != 0:
+        return code
     for k in range(BODY_SIZE * len(scene.bodies.mass), len(y)):
         new[k] = y[k] + h * dy[k]
     move_bodies(scene, S, y, h, new)
