@@ -32,7 +32,7 @@ RULE_NUMBERS = 4
     KEPT_GAP,  # at the step's begin
     KEPT_CLOSING,  # speed before it
     KEPT_SLIP,  # behind it
-    KEPT_STICKS,  # 1 where nothing slipped
+    KEPT_STICKS,  # 1 where the pair's friction is less than it may be
     KEPT_WEIGHT,
     KEPT_ROW,
     KEPT_STAYS,  # 1 where a point of the step at hand is the same one
@@ -41,9 +41,9 @@ KEPT_POINT, KEPT_NORMAL, KEPT_TANGENT, KEPT_FORCE = 14, 17, 20, 23
 KEPT_COLUMNS = 26
 # entries of `Plan.number`: 1 where the error of steps is not estimated; lengths below which gaps
 # and changes of position do not count; what the solver may leave of a velocity, times h; 1 where
-# some kind of pair is not near
-FIXED, SLOP, LEFT, SOME_AHEAD = range(4)
-PLAN_NUMBERS = 4
+# some kind of pair is not near; how fast positions are projected, see `solver.project_positions`
+FIXED, SLOP, LEFT, SOME_AHEAD, PUSH_SPEED = range(5)
+PLAN_NUMBERS = 5
 # entries of `Tally.number`, of the last step tried: what the solver left, as a velocity; its
 # length; the contact that closed fastest in it, and by how much within its length; how far its end
 # is from that of two halves, and its middle from the state between them; when it ended, once it
@@ -123,6 +123,7 @@ class Points(NamedTuple):
     moves: F3  # (wide rows, 6, 3) their velocities by r
     W: F3  # (m, 3, 3) u by r
     mu: F1  # (m,)
+    holds: F1  # (m,) mu as it is at the step's begin
     ahead: F1  # (m,) u_n + ahead >= 0 where the point closes
     closing: F1  # (m,) u_n before the step
     r: F2  # (m, 3)
@@ -147,6 +148,7 @@ class Tally(NamedTuple):
 
     number: F1  # (TALLY_NUMBERS,)
     count: I1  # type: ignore[assignment]  # (TALLY_COUNTS,)
+    load: F2  # (nc, 2) friction of pairs that stick over the most it may be, of a step's halves
     deepest: F1  # (nc,) depth of each contact at the begins of the parts of the step tried last
 
 
@@ -212,6 +214,7 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int]) -
         moves=numbers(wide, 6, 3),
         W=numbers(m, 3, 3),
         mu=numbers(m),
+        holds=numbers(m),
         ahead=numbers(m),
         closing=numbers(m),
         r=numbers(m, 3),
@@ -221,5 +224,6 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int]) -
     )
     room = 1 << max(4, int(4 * m - 1).bit_length())
     kept = Kept(whole(1), whole(m), np.zeros((m, KEPT_COLUMNS)), whole(room))
-    tally = Tally(np.zeros(TALLY_NUMBERS), whole(TALLY_COUNTS), np.zeros(len(rules.number)))
+    nc = len(rules.number)
+    tally = Tally(np.zeros(TALLY_NUMBERS), whole(TALLY_COUNTS), numbers(nc, 2), numbers(nc))
     return Stepping(rules, plan, motion, points, kept, tally)

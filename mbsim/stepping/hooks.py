@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import LISTINGS
+from mbsim.arrays.codes import LISTINGS, SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.hooks import Contacts, Hook, Joints, failure_or
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, vector_at, view
@@ -18,6 +18,7 @@ from mbsim.dynamics.pipeline.hooks import accept
 from mbsim.dynamics.pipeline.output import no_room, scaled_error
 from mbsim.stepping.arrays import FIXED, Stepping
 from mbsim.stepping.audit import examine_row, examine_step
+from mbsim.stepping.friction import overdue
 from mbsim.stepping.halves import take_fixed_step
 from mbsim.stepping.pairs import commit_distances
 from mbsim.stepping.rows import (
@@ -92,7 +93,10 @@ def norm(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     if S.plan.number[FIXED] == 1.0:
         return 0.0
     n = scene.rows.y.shape[1]
-    return scaled_error(scene, math.inf if h > 0.0 else h, vector_at(a, n), vector_at(b, n))
+    error = scaled_error(scene, math.inf if h > 0.0 else h, vector_at(a, n), vector_at(b, n))
+    # what would have slid for so long, at the model's own acceleration V^2/L
+    part = overdue(S, h) * scene.world.scale[SCALE_SPEED] / scene.world.scale[SCALE_LENGTH]
+    return max(error, 0.5 * part * part) if h > 0.0 else error
 
 
 def commit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:

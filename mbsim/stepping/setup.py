@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numba import types
 
-from mbsim.arrays.codes import SCALE_LENGTH
+from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.hooks import Hook
 from mbsim.core import jit
 from mbsim.core.address import pack
@@ -23,6 +23,7 @@ from mbsim.stepping.arrays import (
     NEWTONS,
     PLAN_NUMBERS,
     PROJECTED,
+    PUSH_SPEED,
     SLOP,
     SOME_AHEAD,
     UNSOLVED,
@@ -123,6 +124,7 @@ def _plan(system: System, fixed: bool, tol: float) -> Plan:
     number[FIXED] = float(fixed)
     group, members, first = _groups(system)
     number[SOME_AHEAD] = float(not near.all())
+    number[PUSH_SPEED] = float(scene.world.scale[SCALE_SPEED])
     number[SLOP], number[LEFT] = COUNTS * tol * length, LEAVES * tol * length
     return Plan(number, near, rows, group, members, first)
 

@@ -223,11 +223,13 @@ def solve_points(
 
 
 @jitable
-def project_positions(p: Points, shift: F2, count: int, h: float, slop: float) -> int:
+def project_positions(p: Points, shift: F2, count: int, h: float, slop: float, most: float) -> int:
     """Change displacements over h so that no point ends deeper than `slop`; return the sweeps.
 
     The least change in the norm of the mass: gap + h H_n shift >= 0 without friction, pushes start
-    at 0. Where nothing ends so deep nothing changes.
+    at 0. Where nothing ends so deep nothing changes. What begins deeper than `most`, as a deck may
+    begin, comes out by no more than that: a jump in positions is no motion that a shorter step
+    would find.
     """
     for k in range(count):
         p.push[k] = 0.0
@@ -237,7 +239,7 @@ def project_positions(p: Points, shift: F2, count: int, h: float, slop: float) -
         for step in range(count):
             k = count - 1 - step if sweeps % 2 == 1 else step
             i, j = p.body[k, 0], p.body[k, 1]
-            gap = p.gap[k] + h * velocity_of(p.H, k, 0, shift, i, j)
+            gap = max(p.gap[k], -most) + h * velocity_of(p.H, k, 0, shift, i, j)
             if gap >= -0.5 * slop and p.push[k] == 0.0:
                 continue
             wanted = p.push[k] - gap / (h * p.W[k, 0, 0]) if p.W[k, 0, 0] > 0.0 else 0.0

@@ -43,22 +43,22 @@ from mbsim.stepping.arrays import (
     ALL_POINTS,
     ALL_STEPS,
     ALL_SWEEPS,
-    FIRST_SPEED,
+    KEPT_STICKS,
     LEFT,
     NEWTONS,
     POINTS,
     PRESSING,
     PROJECTED,
+    PUSH_SPEED,
     RESIDUAL,
     RESTITUTION,
     SLOP,
     SLOWEST,
-    SPEEDS,
     STEP_LENGTH,
-    STICKING,
     UNSOLVED,
     Stepping,
 )
+from mbsim.stepping.friction import NOISE, coefficient, keep_loads, let_yield
 from mbsim.stepping.kept import index_kept, recall
 from mbsim.stepping.pairs import find_missed, find_points
 from mbsim.stepping.points import fill_point, fill_reach
@@ -69,12 +69,14 @@ from mbsim.stepping.solver import (
     velocity_of,
 )
 
-#: Closing speeds have no restitution up to so many times what the solver may leave of one.
-NOISE = 30.0
 #: Newton iterations for the spin of a body at most.
 MOST_SPINS = 12
 #: How much farther than a step can come near pairs are looked for.
 ROOM = 4.0
+#: How often a step is solved at most, as what stuck slips.
+MOST_YIELDS = 6
+#: Overlaps so many times deeper than what does not count are pushed out at a bounded speed.
+DEEP = 5.0
 #: How often a step's contact problem is solved at most, each time with what bodies hit that the
 #: impulses threw at it.
 MOST_ATTEMPTS = 4
@@ -197,19 +199,6 @@ def fill_motion(scene: Scene, S: Stepping, y: F1, h: float) -> None:
 
 
 @jitable
-def coefficient(S: Stepping, c: int, slip: float) -> float:
-    """Return the coefficient of friction of contact c at a slip speed."""
-    numbers, curve = S.rules.number[c], S.rules.curve[c]
-    if slip <= numbers[FIRST_SPEED]:
-        return numbers[STICKING]
-    at = math.log2(slip / numbers[FIRST_SPEED])
-    k = int(at)
-    if k >= SPEEDS - 1:
-        return curve[SPEEDS - 1]
-    return curve[k] + (at - k) * (curve[k + 1] - curve[k])
-
-
-@jitable
 def look_ahead(S: Stepping, k: int, h: float) -> float:
     """Fill what the normal velocity of point k is held above; return the part before an impact.
 
@@ -246,10 +235,15 @@ def prepare_points(scene: Scene, S: Stepping, h: float) -> int:
         if not fill_point(scene, S, k, begin):
             return Code.NO_ROOM
         begin += P.many[k] if P.wide[k] >= 0 else 0
+    recall(S, h)
+    for k in range(count):
         i, j = P.body[k, 0], P.body[k, 1]
         x, z = velocity_of(P.H, k, 1, M.before, i, j), velocity_of(P.H, k, 2, M.before, i, j)
-        P.mu[k] = coefficient(S, P.contact[k], math.hypot(x, z))
-    recall(S, h)
+        slip, row = math.hypot(x, z), P.was[k]
+        if row >= 0 and slip <= NOISE * S.plan.number[LEFT] / h:
+            # what stuck moves by what the solver left of it
+            slip = 0.0 if S.kept.table[row, KEPT_STICKS] == 1.0 else slip
+        P.holds[k] = coefficient(S, P.contact[k], slip)
     return 0
 
 
@@ -358,16 +352,23 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
     slop = S.plan.number[SLOP]
     allowed = S.plan.number[LEFT] / h
     left, sweeps = 0.0, 0
-    if count > 0:
-        left, sweeps, newtons = solve_points(P, M, nb, count, allowed)
+    for k in range(count):
+        P.mu[k] = P.holds[k]
+    for _ in range(MOST_YIELDS if count > 0 else 0):
+        left, more, newtons = solve_points(P, M, nb, count, allowed)
+        sweeps += more
         tally.count[NEWTONS] += newtons
         if not math.isfinite(left):
             return Code.NOT_FINITE
+        if not let_yield(S, count, allowed):
+            break
+    keep_loads(S, count, committed)
     spread_parts(S, count, h, slop, nb)
     for b in range(nb):
         for c in range(6):
             M.shift[b, c] = M.part[b] * M.before[b, c] + (1.0 - M.part[b]) * M.v[b, c]
-    pushes = project_positions(P, M.shift, count, h, slop)
+    most = max(DEEP * slop, h * S.plan.number[PUSH_SPEED])
+    pushes = project_positions(P, M.shift, count, h, slop, most)
     number = tally.number
     # of two halves that make one step the worse one counts
     number[RESIDUAL] = left if committed else max(left, number[RESIDUAL])
