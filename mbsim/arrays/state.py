@@ -43,7 +43,9 @@ class Broadphase(NamedTuple):
     ]  # (large contacts, shapes^2) kind by shape class of I and of J, -1 for none
     swap: tags.Constant[I2]  # (large contacts, shapes^2) 1 where the kernel wants the other order
     size: F1  # (2,) a pair is near if its boxes are nearer than the first; a usual reach
-    reference: F2  # (ng, 7) centre and quaternion of the body when pairs were last listed
+    #: (ng, 7) centre and quaternion of the body, of a plane its normal, when pairs were last listed
+    reference: F2
+    lever: F1  # (ng,) of a plane that moves: from its marker to a usual member
     room: (
         F1  # (ng,) how far any point may still move before that; inf for who is in no large contact
     )

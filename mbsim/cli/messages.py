@@ -16,6 +16,10 @@ _UNSEEN = re.compile(
 )
 
 
+#: File and line with which a message of a deck begins.
+_PLACE = re.compile(r"([^\n]+?\.\w+:\d+): (.*)", re.DOTALL)
+
+
 def printable(text: str) -> str:
     """Return a text with everything that a terminal would obey written as an escape."""
     return _UNSEEN.sub(_escaped, text)
@@ -41,10 +45,22 @@ def counted(count: int, name: str) -> str:
     return f"{count} {name}"
 
 
+def with_severity(severity: str, text: str) -> str:
+    """Return a message as it is printed: with file and line first, where editors look for them."""
+    place, message = split_place(text)
+    return f"{place}: {severity}: {message}" if place else f"mbsim: {severity}: {text}"
+
+
+def split_place(text: str) -> tuple[str, str]:
+    """Return file and line with which a message begins, ``deck.xml:12``, or nothing; the rest."""
+    found = _PLACE.match(text)
+    return (found[1], found[2]) if found else ("", text)
+
+
 def warn(lines: Iterable[str]) -> None:
     """Print warnings."""
     for line in lines:
-        echo(f"mbsim: warning: {line}", err=True)
+        echo(with_severity("warning", line), err=True)
 
 
 def print_json(value: Any) -> None:

@@ -220,6 +220,7 @@ def broadphase_table(
         swap=np.zeros((n, len(shapes) ** 2), dtype=np.int64),
         size=np.zeros(2),
         reference=np.zeros((ng if n else 0, 7)),
+        lever=np.zeros(ng if n else 0),
         room=np.full(ng, math.inf),
         box=np.zeros((ng if n else 0, 6)),
         cell=np.zeros(ng if n else 0, dtype=np.int64),

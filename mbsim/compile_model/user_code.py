@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import typing
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -125,8 +126,14 @@ def _load_subroutines(
 
 def no_residuals() -> Residuals:
     """Return the rows of a model without elements of users' residuals."""
+    return Residuals(*(np.zeros((0,) * axes, kind) for kind, axes in _residual_arrays()))
+
+
+@functools.cache
+def _residual_arrays() -> list[tuple[Any, int]]:
+    """Return type and number of axes of the arrays of `Residuals`."""
     kinds = typing.get_type_hints(Residuals, include_extras=True).values()
-    return Residuals(*(np.zeros((0,) * k.__metadata__[1], k.__metadata__[0]) for k in kinds))
+    return [(kind.__metadata__[0], kind.__metadata__[1]) for kind in kinds]
 
 
 def _load_residuals(

@@ -118,7 +118,8 @@ def pack(group: NamedTuple) -> np.ndarray[Any, np.dtype[np.int64]]:
     for array in _leaves(group):
         if not array.flags.c_contiguous:
             raise ValueError("a packed array must be C-contiguous")
-        words.append(array.ctypes.data)
+        # `ctypes.data` is the same, and makes an object for it
+        words.append(array.__array_interface__["data"][0])
         words.extend(array.shape)
     return np.array(words, dtype=np.int64)
 

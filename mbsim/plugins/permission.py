@@ -104,7 +104,9 @@ def _timed(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
 
 
 @contextlib.contextmanager
-def limited(timeout: float | None, tell: Callable[[str], None]) -> Iterator[None]:
+def limited(
+    timeout: float | None, tell: Callable[[str], None], interpreted: bool = True
+) -> Iterator[None]:
     """Watch over calls of users' functions while a run goes on.
 
     Parameters
@@ -113,6 +115,8 @@ def limited(timeout: float | None, tell: Callable[[str], None]) -> Iterator[None
         Longest time of a call [s]; None lets calls take as long as they take.
     tell : callable
         Called with a line, once a call, where one takes longer than `LONG`.
+    interpreted : bool
+        Whether there are functions whose calls can be watched; else only memory is bounded.
 
     Raises
     ------
@@ -126,7 +130,8 @@ def limited(timeout: float | None, tell: Callable[[str], None]) -> Iterator[None
         raise ModelError("plugin_timeout: only in the main thread of a POSIX system")
     before = signal.signal(signal.SIGALRM, _end_call) if timeout else None
     _limits.timeout, outer = timeout or 0.0, _limits.timeout
-    watch.start()
+    if interpreted:
+        watch.start()
     try:
         with _bounded_memory():
             yield

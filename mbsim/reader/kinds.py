@@ -46,7 +46,11 @@ def about_degrees(text: str) -> str:
     number = text.rstrip("dD")
     if number == text or not _REAL.fullmatch(number):
         return ""
-    return f"; angles are in radians, {number} degrees are {math.radians(float(number)):.9g}"
+    radians = math.radians(float(number))
+    return (
+        f"; angles are in radians, {number} degrees are {radians:.9g}: D is for expressions and "
+        "Adams decks"
+    )
 
 
 def parse_integer(text: str) -> int:

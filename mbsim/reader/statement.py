@@ -197,7 +197,7 @@ class Entry:
             if name is not None and name not in found:
                 found[name] = attribute
             elif name is None:
-                close = nearest(attribute.name, self.statement.attributes)
+                close = self._meant(attribute.name)
                 known = ", ".join(self.statement.attributes) or "none"
                 help = close or f"; known: {known}"
                 message = f'{attribute.name}="{_short(attribute.value)}": unknown attribute{help}'
@@ -208,6 +208,21 @@ class Entry:
                 found[name] = Attribute(first.name, joined, first.line, first.origin)
             else:
                 self.fault(f"given twice, the second time as {attribute.name}", name)
+
+    def _meant(self, name: str) -> str:
+        """Return ``; did you mean X?``: what is required and not given, else the most alike.
+
+        i_body_id is i_graphics_id where that is missing: all but one of the words are the same.
+        """
+        specs, words = self.statement.attributes, name.lower().split("_")
+        given = {fold(attribute.name) for attribute in self.node.attributes}
+        for known, spec in specs.items():
+            others = known.split("_")
+            alike = sum(map(str.__eq__, words, others))
+            if spec.required and fold(known) not in given and len(words) == len(others) > 1:
+                if alike == len(words) - 1 > 0:
+                    return f"; did you mean {known}?"
+        return nearest(name, specs)
 
     def _parse(self) -> None:
         """Store the values, or the faults, refusals and notes that they give rise to."""

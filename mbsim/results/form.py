@@ -23,6 +23,16 @@ _EVENT = ("time", "kind")
 FACTS = ("id", "label", "type")
 
 
+def is_dataset(item: Any) -> bool:
+    """Return whether something is a dataset, of a file or in memory."""
+    return hasattr(item, "dtype") and hasattr(item, "shape")  # a named type has no shape
+
+
+def is_group(item: Any) -> bool:
+    """Return whether something is a group, of a file or in memory."""
+    return hasattr(item, "visititems")
+
+
 def facts_of(item: Any) -> dict[str, Any]:
     """Return the attributes of a group, each a number or a text."""
     found = {name: plain(value) for name, value in item.attrs.items()}
@@ -87,7 +97,7 @@ def _is_table(item: Any, axes: int) -> bool:
 def values_of(dataset: h5py.Dataset, index: Any = ()) -> Any:
     """Return values of a dataset, if they can be there."""
     # in memory and where there are checksums it is as it was made
-    known = dataset.file.driver in ("fileobj", "core")
+    known = dataset.file.driver in ("fileobj", "memory")
     if not known and claims_too_much(dataset) and not _may_be_zeros(dataset):
         raise ValueError(f"{dataset.name} is said to be larger than what is stored")
     return dataset[index]

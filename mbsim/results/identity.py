@@ -201,8 +201,15 @@ class Identity:
     """
 
     def __init__(self, system: System, settings: Any = None) -> None:
+        self._system = system
+        self._settings = settings
+
+    @functools.cached_property
+    def facts(self) -> dict[str, dict[str, Any]]:
+        """Facts by kind, by name; made when they are asked for: only a file needs them."""
+        system, settings = self._system, self._settings
         file = system.model.file
-        self.facts = {
+        return {
             "checkpoint": of_checkpoint(),
             "model": of_elements(system.model, file),
             "settings": {} if settings is None else of_elements(settings, file),

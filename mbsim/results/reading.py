@@ -18,6 +18,8 @@ from mbsim.results.form import (
     FACTS,
     check_members,
     facts_of,
+    is_dataset,
+    is_group,
     is_signal,
     last_row,
     plain,
@@ -59,7 +61,7 @@ class Results(SignalMapping):
 
     A name may end in ``/x``, ``/y``, ``/z`` or ``/mag`` (a quaternion also in ``/w``, a request
     in ``/F1`` to ``/F8``). Scalars come as numbers. Use it as a context manager or call
-    `close` to let go of the file.
+    `close` to let go of the file, which is h5py's or, in memory, a `MemoryFile`.
     """
 
     def __init__(self, file: h5py.File, path: Path | None) -> None:
@@ -121,9 +123,7 @@ class Results(SignalMapping):
         """Let a copy in another process open the file anew; results in memory take it along."""
         if self.path is not None:
             return open_results, (str(self.path.absolute()),)
-        file = self._open()
-        file.flush()
-        return from_bytes, (file.id.get_file_image(),)
+        return Results, (self._open(), None)
 
     def _open(self) -> h5py.File:
         if not self._file:
@@ -180,14 +180,12 @@ class Results(SignalMapping):
 
     def _stored(self) -> dict[str, h5py.Dataset]:
         """Return the datasets that hold one signal or table, by name."""
-        import h5py
-
         found: dict[str, h5py.Dataset] = {}
         file = self._open()
 
         def note(name: str, item: Any) -> None:
             group, _, last = name.rpartition("/")
-            if not isinstance(item, h5py.Dataset) or name.startswith(_NO_KEYS):
+            if not is_dataset(item) or name.startswith(_NO_KEYS):
                 return
             # of a group whose elements stand side by side `_columnwise` gives the names
             if "/" in group or not last or f"{group}/id" not in file:
@@ -309,12 +307,10 @@ class Results(SignalMapping):
     @reads
     def tables(self, group: str) -> dict[str, Any]:
         """Return all datasets under a group as arrays, by their names in it."""
-        import h5py
-
         found: dict[str, Any] = {}
 
         def note(name: str, item: Any) -> None:
-            if isinstance(item, h5py.Dataset):
+            if is_dataset(item):
                 found[name] = np.asarray(values_of(item))
 
         self._open()[group].visititems(note)
@@ -376,17 +372,15 @@ class Results(SignalMapping):
 
     def _location(self, name: str) -> Location | None:
         """Return where a signal or table is stored."""
-        import h5py
-
         file = self._open()
-        if isinstance(file.get(name), h5py.Dataset):
+        if is_dataset(file.get(name)):
             return Location(name, None)
         group, _, rest = name.partition("/")
         id, _, last = rest.partition("/")
         ids = self._columns().get(group)
         if ids is None or last in FACTS or not id.isdecimal() or int(id) not in ids:
             return None
-        if not isinstance(file.get(f"{group}/{last}"), h5py.Dataset):
+        if not is_dataset(file.get(f"{group}/{last}")):
             return None
         return Location(f"{group}/{last}", ids.index(int(id)))
 
@@ -417,14 +411,12 @@ class Results(SignalMapping):
 
         `known` are names that may be offered.
         """
-        import h5py
-
         asked = name.strip("/")
         depth = len(asked) + 1 if asked else 0
         inside = {
             key[depth:].partition("/")[0] for key in self.keys() if key[:depth] == f"{asked}/"
         }
-        if depth and (inside or isinstance(self._open().get(asked), h5py.Group)):
+        if depth and (inside or is_group(self._open().get(asked))):
             there = ", ".join(sorted(inside, key=order)[:12]) or "nothing"
             return f"{self.place}: {name} is a group, not a signal; it has {there}"
         signals = self.signals()
@@ -480,13 +472,6 @@ def open_results(path: str | Path) -> Results:
         opened.close()
         raise ResultsError(f"{file}: is HDF5, but not a result file of mbsim")
     return Results(opened, file)
-
-
-def from_bytes(image: bytes) -> Results:
-    """Return results in memory from the bytes of their file."""
-    import h5py
-
-    return Results(h5py.File(h5py.h5f.open_file_image(image)), None)
 
 
 def end_state(results: Results) -> dict[str, dict[str, list[float]]]:

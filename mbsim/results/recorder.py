@@ -29,12 +29,12 @@ from mbsim.results.blocks import (
     row_bytes,
 )
 from mbsim.results.chunks import LONG
-from mbsim.results.contact_posts import ContactPosts
 from mbsim.results.csv_file import write_csv
 from mbsim.results.elements import acting
 from mbsim.results.files import prepare_directory
 from mbsim.results.forces import check_requests
 from mbsim.results.identity import Identity
+from mbsim.results.memory import MemoryStore
 from mbsim.results.reading import Results, open_results
 from mbsim.results.resume import MADE_OF, WRITTEN, check_same, digest
 from mbsim.results.signal_filter import SignalFilter
@@ -44,7 +44,7 @@ from mbsim.results.watch import Watch
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
-
+    from mbsim.results.contact_posts import ContactPosts
 
 _PEAKS = {"force": PEAK_FORCE, "penetration": PEAK_DEPTH, "slip_speed": PEAK_SLIP}
 
@@ -120,11 +120,17 @@ class Recorder:
         self._target: Path | None = None
         self._saved: set[str] = set()  # tables of the checkpoint in the part file
         self._last: dict[str, Table] = {}  # those of the last published one
-        self._posts = ContactPosts(system, system.posts) if system.posts else None
+        self._posts: ContactPosts | None = None
+        if system.posts:
+            from mbsim.results.contact_posts import ContactPosts
+
+            self._posts = ContactPosts(system, system.posts)
         check_requests(system.model)
         if asked:
             self._asked.check(names_of(system))
-        self._settings: dict[str, Value] = {**attributes, **self._identity.digests}
+        # --resume compares digests
+        digests = self._identity.digests if directory is not None else {}
+        self._settings: dict[str, Value] = {**attributes, **digests}
         if directory is not None:
             prepare_directory(directory, system.model.name)
             self._target = directory / f"{system.model.name}.h5"
@@ -134,7 +140,7 @@ class Recorder:
         if resume:
             self.checkpoint = self._resumed()
         self._given = self._written[0]
-        self._store = Store(self._target, resume)
+        self._store = MemoryStore() if self._target is None else Store(self._target, resume)
         self._store.rows_at_once = self._block
         self._begin_file(resume)
 
@@ -188,8 +194,8 @@ class Recorder:
         """
         self._store.rows = int(min(rows, 1e9)) + 1
         rows = max(0.0, rows - self._written[0])  # those of a run that goes on are there
-        empty = self._signals(nothing(self.system))
-        size = sum(table.itemsize * math.prod(table.shape[1:]) for _, table in empty)
+        tables = (table for _, table in self._signals(nothing(self.system)))
+        size = sum(table.itemsize * math.prod(table.shape[1:]) for table in tables)
         if self._target is None:
             place, free = "in memory", free_memory()
         else:
@@ -208,7 +214,7 @@ class Recorder:
     def take(self) -> None:
         """Take all rows, incidents and events that the pipeline has left so far."""
         rows = self.system.scene.rows
-        n, incidents, events = (int(count) for count in rows.used)
+        n, incidents, events = rows.used.tolist()
         if n == incidents == events == 0:
             return
         block = self._gathered.take(n, incidents, events)
@@ -406,9 +412,9 @@ class Recorder:
             raise failure
         if self._target is not None:
             return open_results(self._target)
-        if in_memory is None:
-            raise ResultsError("results in memory could not be written")
-        return Results(in_memory, None)
+        if in_memory is not None:
+            return Results(in_memory, None)
+        raise ResultsError("results in memory could not be written")
 
     def _beside(self, write_log: Callable[[], None] | None) -> ResultsError | None:
         """Write the ``.csv`` and the log; return why that failed."""
@@ -438,8 +444,7 @@ class Recorder:
         """Let the first rows gathered be written while the loop goes on."""
         self._background.wait()
         self._gathered.take_back(self._free)
-        block = first_rows(self._gathered.block, rows)
-        self._free = self._gathered.hand_over(block)
+        self._free = self._gathered.hand_over(block := first_rows(self._gathered.block, rows))
         first, self._watched = min(self._watched, rows), max(0, self._watched - rows)
         self._given += rows
 
@@ -466,7 +471,7 @@ class Recorder:
             self._fill(first_rows(block, len(block.time) * room // size), columns)
         self._store.update(rows=rows, attributes=columns, last=last)
         self._started = True
-        sizes = (len(block.time), len(block.incidents), len(block.events))
+        sizes = map(len, (block.time, block.incidents, block.events))
         self._written = [a + b for a, b in zip(self._written, sizes, strict=True)]
 
     def _fill(self, block: Block, columns: Mapping[str, Mapping[str, Any]]) -> NoReturn:

@@ -7,7 +7,6 @@ atomically, so that a reader, or whoever looks after a kill, finds the last one 
 from __future__ import annotations
 
 import contextlib
-import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -39,14 +38,14 @@ _SPARE = 1 << 18
 
 
 class Store:
-    """One HDF5 file being written; `target` None keeps it in memory.
+    """One HDF5 file being written.
 
     With `resume` it begins as a copy of what `target` holds. The first failure to write
     raises `ResultsError` and drops the part file; what was published stays. After that
     every call does nothing, so that the caller may still clean up.
     """
 
-    def __init__(self, target: Path | None, resume: bool = False) -> None:
+    def __init__(self, target: Path, resume: bool = False) -> None:
         self.target = target
         self.broken = False
         self.failure: ResultsError | None = None
@@ -60,9 +59,6 @@ class Store:
         self._part: PartFile | None = None
         self._lock: RunLock | None = None
         self.file: h5py.File | None = None
-        if target is None:
-            self.file = _in_memory()
-            return
         try:
             self._lock = RunLock(target)
         except ResultsError:
@@ -87,10 +83,6 @@ class Store:
         self._growing = self._changed = resume
         self._before = None
         assert self.file is not None
-        if self.target is None:
-            self.file.close()
-            self.file = _in_memory()
-            return
         assert self._part is not None
         self._part.close()
         # what HDF5 still has to write goes nowhere
@@ -118,7 +110,7 @@ class Store:
                 raise
             first = self._part.failure if self._part is not None else None
             self.abandon()
-            self.failure = problem(self.target or Path("memory"), first or error)
+            self.failure = problem(self.target, first or error)
             if first is None and not isinstance(error, _OUTSIDE):
                 raise
             raise self.failure from None
@@ -241,7 +233,7 @@ class Store:
         """Add rows to one dataset."""
         if name not in self._writers:
             found = self._growing and name in file
-            if not found and not growing and (self.target is None or rows.nbytes <= _SMALL):
+            if not found and not growing and rows.nbytes <= _SMALL:
                 file.create_dataset(name, data=rows)
                 return
             if not found:
@@ -330,14 +322,6 @@ class Store:
         self.broken = True  # there is nothing left to write to
         self._unlock()
         return None
-
-
-def _in_memory() -> h5py.File:
-    """Open a file that is kept in memory."""
-    import h5py
-
-    name = f"mbsim-{uuid.uuid4().hex}"
-    return h5py.File(name, "w", driver="core", backing_store=False, block_size=1 << 20)
 
 
 def _opened(part: PartFile, mode: str) -> h5py.File:

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbsim.results.blocks import Block, Gathered, nothing
-from mbsim.results.contact_posts import ContactPosts
 from mbsim.results.recorder import Recorder
 
 if TYPE_CHECKING:
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
 
     from mbsim.compile_model.build import System
     from mbsim.results.audit import Audit
+    from mbsim.results.contact_posts import ContactPosts
     from mbsim.results.reading import Results
     from mbsim.results.store import Value
 
@@ -47,7 +47,11 @@ class History:
         self.system = system
         self.chain: Chain | None = None
         self._attributes, self._how = attributes, how
-        self._posts = ContactPosts(system, system.posts) if system.posts else None
+        self._posts: ContactPosts | None = None
+        if system.posts:
+            from mbsim.results.contact_posts import ContactPosts
+
+            self._posts = ContactPosts(system, system.posts)
 
     def take(self) -> None:
         """Take all rows, incidents and events that the pipeline has left so far."""

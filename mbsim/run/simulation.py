@@ -58,7 +58,9 @@ def _limited(system: System, timeout: float | None, tell: Notify) -> AbstractCon
         return nullcontext()
     from mbsim.plugins.permission import limited
 
-    return limited(timeout, tell)
+    users = (*(user for _, user in system.user_laws), *system.residuals.values())
+    interpreted = system.subroutines or system.posts or not all(user.compiled for user in users)
+    return limited(timeout, tell, bool(interpreted))
 
 
 def _parameters(system: System, settings: Settings) -> list[Parameters]:

@@ -22,20 +22,22 @@ LEAST = 1e-6
 
 
 @jitable
+def way_at(scene: Scene, S: Stepping, g: int, h: float, radius: float) -> float:
+    """Bound how far what is at a radius from a graphic's marker may come in a step."""
+    b, far, turns = scene.graphics.body[g], 0.0, 0.0
+    for v in (S.motion.before[b], S.motion.free[b]):
+        far = max(far, norm((v[0], v[1], v[2])))
+        turns = max(turns, norm((v[3], v[4], v[5])))
+    if turns > 0.0:
+        far += turns * (radius + norm(vector(scene.graphics.p[g])))
+    return (1.0 + AHEAD) * h * far
+
+
+@jitable
 def fill_reach(scene: Scene, S: Stepping, h: float) -> None:
     """Bound how far any point of a graphic may come in a step, by its body's velocities."""
-    graphics, M = scene.graphics, S.motion
-    for g in range(len(graphics.body)):
-        b = graphics.body[g]
-        far, turns = 0.0, 0.0
-        for v in (M.before[b], M.free[b]):
-            far = max(far, norm((v[0], v[1], v[2])))
-            turns = max(turns, norm((v[3], v[4], v[5])))
-        if turns > 0.0 and not math.isinf(graphics.radius[g]):
-            far += turns * (graphics.radius[g] + norm(vector(graphics.p[g])))
-        elif turns > 0.0:
-            far = math.inf
-        M.reach[g] = (1.0 + AHEAD) * h * far
+    for g in range(len(scene.graphics.body)):
+        S.motion.reach[g] = way_at(scene, S, g, h, scene.graphics.radius[g])
 
 
 @jitable

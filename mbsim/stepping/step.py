@@ -61,7 +61,7 @@ from mbsim.stepping.arrays import (
 from mbsim.stepping.friction import NOISE, coefficient, keep_loads, let_yield
 from mbsim.stepping.kept import index_kept, recall
 from mbsim.stepping.pairs import find_missed, find_points
-from mbsim.stepping.points import fill_point, fill_reach
+from mbsim.stepping.points import fill_point, fill_reach, way_at
 from mbsim.stepping.solver import (
     apply,
     project_positions,
@@ -112,8 +112,12 @@ def make_room(scene: Scene, S: Stepping, y: F1, h: float) -> None:
     wanted, short = 0.0, False
     for g in range(len(scene.graphics.body)):
         if not math.isinf(broadphase.room[g]):
-            wanted = max(wanted, S.motion.reach[g])
-            short = short or S.motion.reach[g] > broadphase.room[g]
+            reach = S.motion.reach[g]
+            if math.isinf(reach):
+                # a plane that turns: at the distance of a usual member, see `plane_travel`
+                reach = way_at(scene, S, g, h, broadphase.lever[g])
+            wanted = max(wanted, reach)
+            short = short or reach > broadphase.room[g]
     if short:
         broadphase.size[0] = max(broadphase.size[0], ROOM * wanted)
         place_graphics(scene, y)

@@ -226,10 +226,18 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
         FRICTION_LINE,
         ("Force_Contact[301]", 'mu="0.3"', "unknown attribute", "did you mean mu_static?"),
     ),
+    "attribute of another element": (
+        deck(('i_graphics_id="200"', 'i_body_id="2"')),
+        FRICTION_LINE - 2,
+        ("Force_Contact[301]", 'i_body_id="2"', "unknown", "did you mean i_graphics_id?"),
+    ),
     "angle in degrees": (
         marker('psi="25D"'),
         MARKER_LINE,
-        ('psi="25D"', "must be a number; angles are in radians, 25 degrees are 0.436332313"),
+        (
+            'psi="25D"',
+            "must be a number; angles are in radians, 25 degrees are 0.436332313: D is for",
+        ),
     ),
     "attribute in two spellings": (
         deck(('mass="5"', 'mass="5" MASS="6"')),

@@ -17,7 +17,7 @@ from helpers.fake_run import SETTINGS, add_rows, checkpoint, fake_system
 from helpers.folders import PACKAGES
 from helpers.minimal_deck import CONTACT_LINE, MINIMAL, deck
 from mbsim.cli.main import COMMANDS, main
-from mbsim.cli.messages import counted
+from mbsim.cli.messages import counted, with_severity
 from mbsim.cli.progress import Display
 from mbsim.errors import Interrupted, ModelError, PluginError, ResultsError, SolverError
 from mbsim.results.reading import Results
@@ -227,8 +227,44 @@ def test_check_lists_every_fault(tmp_path: Path) -> None:
     assert result.stdout == ""
     lines = result.stderr.splitlines()
     assert lines[2:] == ["mbsim: see: mbsim manual post_graphic; mbsim manual force_contact"]
-    assert lines[0].startswith(f"mbsim: error: {path}:{CONTACT_LINE - 1}: Post_Graphic[200]")
-    assert lines[1].startswith(f"mbsim: error: {path}:{CONTACT_LINE + 1}: Force_Contact[301]")
+    assert lines[0].startswith(f"{path}:{CONTACT_LINE - 1}: error: Post_Graphic[200]")
+    assert lines[1].startswith(f"{path}:{CONTACT_LINE + 1}: error: Force_Contact[301]")
+
+
+def test_check_as_json(model: str, tmp_path: Path) -> None:
+    result = call("check", model, "--json")
+    assert result.exit_code == 0
+    found = json.loads(result.stdout)
+    assert found["ok"]
+    assert found["counts"]["bodies"] == 1
+    assert found["elements"][0]["element"] == "Force_Contact[301]"
+    assert {message["severity"] for message in found["messages"]} == {"note"}
+    path = tmp_path / "bad.xml"
+    path.write_text(deck(('stiffness="1e8"', 'stiffness="-1"'), ('radius="0.108"', 'radius="x"')))
+    result = call("check", str(path), "--json")
+    assert result.exit_code == 2
+    assert result.stderr == ""
+    found = json.loads(result.stdout)
+    assert not found["ok"]
+    lines = [(fault["line"], fault["element"]) for fault in found["messages"]]
+    assert lines == [
+        (CONTACT_LINE - 1, "Post_Graphic[200]"),
+        (CONTACT_LINE + 1, "Force_Contact[301]"),
+    ]
+    assert call("check", model, "--json", "--repair").exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "printed"),
+    [
+        ("a b.xml:12: Body_Rigid[2]: no", "a b.xml:12: error: Body_Rigid[2]: no"),
+        ("deck.xml: cannot be read", "mbsim: error: deck.xml: cannot be read"),
+        ("at 12:30: no", "mbsim: error: at 12:30: no"),
+        ("f.py:3: Force_Contact[1]:\nTrace", "f.py:3: error: Force_Contact[1]:\nTrace"),
+    ],
+)
+def test_file_and_line_come_first(text: str, printed: str) -> None:
+    assert with_severity("error", text) == printed
 
 
 def test_one_thing_is_not_told_as_many() -> None:
@@ -247,7 +283,8 @@ def test_warnings_go_to_standard_error(tmp_path: Path) -> None:
     path.write_text(deck(('mu_dynamic="0.2"', 'mu_dynamic="0.5"')))
     result = call("check", str(path))
     assert result.exit_code == 0
-    assert "mbsim: warning: " in result.stderr
+    assert result.stderr.startswith(f"{path}:")
+    assert ": warning: Force_Contact[301]" in result.stderr
     assert "warning: " not in result.stdout
 
 

@@ -8,7 +8,7 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
-from mbsim.core.rotation import matrix_from_quaternion, rotate
+from mbsim.core.rotation import dot, matrix_from_quaternion, norm, rotate, sub, vector
 
 
 @jitable
@@ -57,6 +57,21 @@ def place_graphic(scene: Scene, y: F1, g: int) -> None:
 
 
 @jitable
+def plane_travel(scene: Scene, g: int) -> float:
+    """Return how far plane g has come towards a point since near pairs were listed.
+
+    h = n.(x - p) changes by (n - n0).(x - p0) - n.(p - p0): no more than that at the lever's
+    distance, and in proportion to it farther away. Sliding in itself and spinning about its
+    normal a plane goes nowhere.
+    """
+    frame, broadphase = scene.work.frames[g], scene.broadphase
+    before = broadphase.reference[g]
+    n = (frame[5], frame[8], frame[11])
+    way = dot(n, sub(vector(frame), vector(before)))
+    return abs(way) + norm(sub(n, vector(before[3:]))) * broadphase.lever[g]
+
+
+@jitable
 def place_graphics(scene: Scene, y: F1) -> bool:
     """Place every shape that moves, and bound how far any of its points has come.
 
@@ -84,6 +99,9 @@ def place_graphics(scene: Scene, y: F1) -> bool:
                     qq += y[at + k] * y[at + k]
                 travel += 2.0 * graphics.radius[g] * math.sqrt(max(0.0, 1.0 - d * d / qq))
         work.travel[g] = travel
-        if travel > scene.broadphase.room[g]:
-            listed = False
+        room = scene.broadphase.room[g]
+        if travel < math.inf:
+            listed = listed and travel <= room
+        elif room < math.inf:
+            listed = listed and plane_travel(scene, g) <= 0.5 * scene.broadphase.size[0]
     return listed

@@ -2,7 +2,8 @@
 
 Every member has a box around it, aligned with the global axes and grown by half the skin. Pairs
 whose boxes meet are listed. While no point of a member has moved by more than half the skin
-since, no other pair can touch; that much is its room. Members of usual size are sorted into the
+since, no other pair can touch; that much is its room. What a plane that moves has come is measured
+at the distance of a usual member, see `plane_travel`. Members of usual size are sorted into the
 cells of a grid as wide as the largest of them, so boxes that meet are in neighbouring
 cells; planes and giants are few and are held against everybody. A pair keeps its row, and
 with it its incidents, as long as it is near.
@@ -35,6 +36,7 @@ from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import norm, sub, vector
+from mbsim.dynamics.bodies.kinematics import plane_travel
 from mbsim.dynamics.contact.detection import measure_pair
 
 #: Members wider than so many usual ones are held against everybody.
@@ -92,9 +94,12 @@ def near(scene: Scene, i: int, j: int, skin: float) -> bool:
     radius, ground = scene.graphics.radius, len(scene.bodies.mass)
     for plane, other in ((i, j), (j, i)):
         if math.isinf(radius[plane]):
-            # where a plane that moves will be is not followed
-            moves = scene.graphics.body[plane] != ground
-            return moves or not above_plane(scene, plane, other, skin)
+            if scene.graphics.body[plane] != ground:
+                # half of the skin is the other's, half the plane's: more farther away
+                x, p = vector(scene.work.frames[other]), vector(scene.work.frames[plane])
+                farther = (norm(sub(x, p)) + skin) / scene.broadphase.lever[plane]
+                skin *= 0.5 + 0.5 * max(1.0, farther)
+            return not above_plane(scene, plane, other, skin)
     return boxes_meet(scene, i, j) and balls_meet(scene, i, j, skin)
 
 
@@ -405,12 +410,34 @@ def close_ranks(scene: Scene) -> None:
 
 
 @jitable
+def fill_levers(scene: Scene) -> None:
+    """Measure how far planes that move are from a usual member: the harmonic mean.
+
+    What has flown away does not count in it.
+    """
+    broadphase, graphics, frames = scene.broadphase, scene.graphics, scene.work.frames
+    usual = broadphase.size[1]
+    for at in range(len(broadphase.member)):
+        g = broadphase.member[at]
+        if graphics.body[g] == len(scene.bodies.mass) or graphics.radius[g] < math.inf:
+            continue
+        count, total = 0, 0.0
+        for k in range(len(broadphase.member)):
+            other = broadphase.member[k]
+            if graphics.radius[other] < math.inf and graphics.body[other] != graphics.body[g]:
+                way = norm(sub(vector(frames[other]), vector(frames[g])))
+                count, total = count + 1, total + 1.0 / (way + usual)
+        broadphase.lever[g] = count / total if count > 0 else usual
+
+
+@jitable
 def list_pairs(scene: Scene, y: F1) -> None:
     """List the near pairs of all large contacts at the committed state, and how long that holds."""
     broadphase, pairs = scene.broadphase, scene.pairs
     ground = len(scene.bodies.mass)
     scene.log.counters[LISTINGS] += 1
     skin = broadphase.size[0]
+    fill_levers(scene)
     for _ in range(MOST_HALVINGS):
         for k in range(len(broadphase.member)):
             fill_box(scene, broadphase.member[k], skin)
@@ -428,12 +455,18 @@ def list_pairs(scene: Scene, y: F1) -> None:
     for k in range(len(broadphase.member)):
         g = broadphase.member[k]
         b = scene.graphics.body[g]
-        if b < ground and not math.isinf(scene.graphics.radius[g]):
-            broadphase.room[g] = 0.5 * skin
+        if b == ground:
+            continue
+        frame, reference = scene.work.frames[g], broadphase.reference[g]
+        broadphase.room[g] = 0.5 * skin
+        for j in range(3):
+            reference[j] = frame[j]
+        if math.isinf(scene.graphics.radius[g]):
             for j in range(3):
-                broadphase.reference[g, j] = scene.work.frames[g, j]
+                reference[3 + j] = frame[5 + 3 * j]
+        else:
             for j in range(4):
-                broadphase.reference[g, 3 + j] = y[BODY_SIZE * b + 3 + j]
+                reference[3 + j] = y[BODY_SIZE * b + 3 + j]
 
 
 @jitable
@@ -452,7 +485,9 @@ def follow(scene: Scene, y: F1) -> None:
             continue
         reference = broadphase.reference[g]
         travel = norm(sub(vector(scene.work.frames[g]), vector(reference)))
-        if graphics.turns[g] == 1:
+        if math.isinf(graphics.radius[g]):
+            travel = plane_travel(scene, g)
+        elif graphics.turns[g] == 1:
             at, d = BODY_SIZE * b + 3, 0.0
             for k in range(4):
                 d += y[at + k] * reference[3 + k]

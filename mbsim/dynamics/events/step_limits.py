@@ -14,7 +14,7 @@ from mbsim.core.address import call_int
 from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import AT_V, AT_W, BODY_SIZE
-from mbsim.core.rotation import dot, norm, sub, vector
+from mbsim.core.rotation import cross, dot, norm, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_body, place_graphic
 from mbsim.dynamics.contact.detection import measure_pair
 from mbsim.dynamics.contact.forces import contact_of, sides, velocity_at
@@ -281,6 +281,16 @@ def step_to_touch(scene: Scene, y: F1, f: F1, pair: int, h: float) -> float:
 
 
 @jitable
+def plane_speed(scene: Scene, y: F1, g: int) -> float:
+    """Return how fast plane g comes towards points at its lever's distance, see `plane_travel`."""
+    frame, at = scene.work.frames[g], BODY_SIZE * scene.graphics.body[g]
+    n = (frame[5], frame[8], frame[11])
+    turning = cross(vector(y[at + AT_W :]), n)
+    v = velocity_at(scene, y, scene.graphics.body[g], vector(frame))
+    return abs(dot(n, v)) + norm(turning) * scene.broadphase.lever[g]
+
+
+@jitable
 def longest_stay(scene: Scene, y: F1, f: F1) -> float:
     """Return a step in which no shape of a large contact leaves where the list of near pairs holds.
 
@@ -301,6 +311,8 @@ def longest_stay(scene: Scene, y: F1, f: F1) -> float:
             work.speed[g, FASTEST_POINT], work.speed[g, CENTRE_ACCELERATION] = speed, push
             room = scene.broadphase.room[g]
             if room < math.inf:
+                if radius == math.inf:
+                    speed = plane_speed(scene, y, g)
                 longest = min(longest, time_for(0.9 * room, speed, push))
     return longest
 

@@ -85,6 +85,8 @@ def _compile(
 def _first_words(error: Exception) -> str:
     """Return the telling line of one of Numba's long messages."""
     plain = re.sub(r"\x1b\[[0-9;]*m", "", str(error))
+    if "built-in function len" in plain:
+        return "what it returns is no list of numbers"
     lines = [line.strip(" -") for line in plain.splitlines()]
     telling = [line for line in lines if line and not line.startswith(("Failed in", "During:"))]
     return f"{type(error).__name__}: {telling[0] if telling else ''}"[:200]

@@ -31,6 +31,24 @@ MATH_CHECKED = {
 }
 MATH_CONSTANTS = frozenset({"pi", "e", "tau", "inf", "nan"})
 BUILTINS = frozenset("abs min max float int len range round bool".split())
+#: What compiles in place of functions that do not, mostly numpy's.
+INSTEAD = {
+    "norm": "hypot(x, y)",
+    "array": "a list",
+    "asarray": "a list",
+    "zeros": "a list",
+    "clip": "min(max(x, low), high)",
+    "sign": "copysign(1.0, x)",
+    "absolute": "abs(x)",
+    "maximum": "max(x, y)",
+    "minimum": "min(x, y)",
+    "power": "x ** y",
+    "square": "x * x",
+    "arctan": "atan(x)",
+    "arctan2": "atan2(y, x)",
+    "dot": "a sum of products",
+    "sum": "a loop",
+}
 HELPERS = {"py_step": 6, "py_step5": 6, "py_getstm": 0, "py_get_contact_area": 0, "py_errmes": 4}
 _ERRORS = frozenset("ValueError ArithmeticError ZeroDivisionError RuntimeError".split())
 
@@ -412,7 +430,15 @@ class _Check:
         if kind == "function":
             self.callees.append(name)
             return
-        raise refuse(node, f"calls {name}")
+        raise refuse(node, f"calls {name}{instead_of(name)}")
+
+
+def instead_of(name: str) -> str:
+    """Return what compiles in place of a call, ``; hypot(x, y) compiles``, or nothing."""
+    owner, _, last = name.rpartition(".")
+    if last in MATH_PLAIN or last in MATH_CHECKED:
+        return f"; {last} of math compiles" if owner else ""
+    return f"; {INSTEAD[last]} compiles" if last in INSTEAD else ""
 
 
 def callee(node: ast.Call, known: Globals, local: set[str]) -> tuple[str, str]:
