@@ -140,6 +140,8 @@ class Joints(IntEnum):
     DISPLACE = 8  # displace bodies by the multipliers as they stand
     SPEED_UP = 9  # change velocities by them
     AUDIT = 10  # look at the residuals of equations
+    READY = 11  # fill all that IMPULSE needs, at y
+    IMPULSE = 12  # replace impulses on bodies by the changes of their velocities: see `impulses`
 
 
 class Dry(IntEnum):

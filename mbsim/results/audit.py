@@ -113,6 +113,22 @@ ENTRIES = (
         10.0,
         "",
     ),
+    Judged(
+        codes.STEP_END,
+        "step_end",
+        "steps of the deck's length are too long for their impacts: positions are off by "
+        "{value:.3g} at the end of one",
+        10.0,
+        "contact",
+    ),
+    Judged(
+        codes.STEP_ROWS,
+        "step_rows",
+        "rows within a step of the deck's length that has an impact lie on a line: they are off by "
+        "up to {value:.3g} (choose a print_interval of whole steps)",
+        10.0,
+        "contact",
+    ),
 )
 #: Those of energy.
 ENERGIES = ("energy", "energy_step")

@@ -32,7 +32,7 @@ RULE_NUMBERS = 4
     KEPT_GAP,  # at the step's begin
     KEPT_CLOSING,  # speed before it
     KEPT_SLIP,  # behind it
-    KEPT_STICKS,  # 1 where nothing slipped
+    KEPT_STICKS,  # 1 where the pair's friction is less than it may be
     KEPT_WEIGHT,
     KEPT_ROW,
     KEPT_STAYS,  # 1 where a point of the step at hand is the same one
@@ -40,16 +40,22 @@ RULE_NUMBERS = 4
 KEPT_POINT, KEPT_NORMAL, KEPT_TANGENT, KEPT_FORCE = 14, 17, 20, 23
 KEPT_COLUMNS = 26
 # entries of `Plan.number`: 1 where the error of steps is not estimated; lengths below which gaps
-# and changes of position do not count; what the solver may leave of a velocity, times h
-FIXED, SLOP, LEFT = range(3)
-PLAN_NUMBERS = 3
-# entries of `Tally.number`, of the last step tried: what the solver left, as a velocity; its length
-RESIDUAL, STEP_LENGTH = range(2)
-TALLY_NUMBERS = 2
+# and changes of position do not count; what the solver may leave of a velocity, times h; 1 where
+# some kind of pair is not near; how fast positions are projected, see `solver.project_positions`
+FIXED, SLOP, LEFT, SOME_AHEAD, PUSH_SPEED = range(5)
+PLAN_NUMBERS = 5
+# entries of `Tally.number`, of the last step tried: what the solver left, as a velocity; its
+# length; the contact that closed fastest in it, and by how much within its length; how far its end
+# is from that of two halves, and its middle from the state between them; when it ended, once it
+# was taken
+RESIDUAL, STEP_LENGTH, FASTEST, CLOSED, END_OFF, ROWS_OFF, ENDED = range(7)
+TALLY_NUMBERS = 7
 # entries of `Tally.count`: contact points, points that press, sweeps so far, steps tried so far,
-# steps that were left unsolved, steps with positions projected, Newton iterations so far
+# steps that were left unsolved, steps with positions projected, Newton iterations so far, points
+# so far, steps of the deck's length that were compared with two halves
 POINTS, PRESSING, ALL_SWEEPS, ALL_STEPS, UNSOLVED, PROJECTED, NEWTONS, ALL_POINTS = range(8)
-TALLY_COUNTS = 8
+COMPARED = 8
+TALLY_COUNTS = 9
 
 
 @tags.constant
@@ -67,6 +73,9 @@ class Plan(NamedTuple):
     number: F1  # (PLAN_NUMBERS,)
     near: I1  # (nk,) 1 where rows of a kind of pair that are apart are points of contact
     rows: I1  # (nk,) rows of a kind of pair, from its first slot on
+    group: I1  # (nb + 1,) of bodies that joints hold together, -1 for free ones and ground
+    members: I1  # (nb,) those bodies, group by group
+    first: I1  # (groups + 1,) of each group's
 
 
 @tags.scratch
@@ -80,7 +89,15 @@ class Motion(NamedTuple):
     shift: F2  # (nb + 1, 6) displacement over the step's length
     part: F1  # (nb + 1,) of `before` in that, the rest being v's
     reach: F1  # (ng,) how far a graphic may come in the step
+    went: F1  # (ng,) how far it goes by what impulses give
     slope: F1  # (ny,) y'
+    way: F2  # (2, 6) velocities of the bodies of a pair that is moved ahead
+    frames: F2  # (2, 12) of its graphics at the step's begin
+    taken: I1  # (pairs + 1,) the try of a step in which a pair has points by that; last: this one
+    least: F1  # (groups,) `part` of each group
+    impulse: F1  # (ny,) impulses on bodies, then what they change of velocities
+    middle: F1  # (ny,) state in the midst of a step
+    half: F2  # (2, ny) states of a step's two halves, where it is compared with them
 
 
 @tags.scratch
@@ -95,12 +112,18 @@ class Points(NamedTuple):
     was: I1  # (m,) row of `Kept` that is the same point, -1 for none
     gap: F1  # (m,)
     point: F2  # (m, 3)
+    arm: F3  # (m, 2, 3) from the bodies' cg, when the point touches
     normal: F2  # (m, 3)
     tangent: F2  # (m, 3)
     H: F4  # (m, 2, 3, 6) velocity along (n, x, y) by those of the bodies
-    answer: F4  # (m, 2, 6, 3) velocities of the bodies by r
+    answer: F4  # (m, 2, 6, 3) velocities of the bodies by r, where joints hold neither
+    wide: I1  # (m,) else first row of `moved`, -1 where they do not
+    many: I1  # (m,) its rows there
+    moved: I1  # (wide rows,) bodies that r moves
+    moves: F3  # (wide rows, 6, 3) their velocities by r
     W: F3  # (m, 3, 3) u by r
     mu: F1  # (m,)
+    holds: F1  # (m,) mu as it is at the step's begin
     ahead: F1  # (m,) u_n + ahead >= 0 where the point closes
     closing: F1  # (m,) u_n before the step
     r: F2  # (m, 3)
@@ -125,6 +148,8 @@ class Tally(NamedTuple):
 
     number: F1  # (TALLY_NUMBERS,)
     count: I1  # type: ignore[assignment]  # (TALLY_COUNTS,)
+    load: F2  # (nc, 2) friction of pairs that stick over the most it may be, of a step's halves
+    deepest: F1  # (nc,) depth of each contact at the begins of the parts of the step tried last
 
 
 class Stepping(NamedTuple):
@@ -138,9 +163,12 @@ class Stepping(NamedTuple):
     tally: Tally
 
 
-def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int]) -> Stepping:
-    """Return empty arrays for so many bodies, graphics, numbers of y and contact points."""
-    nb, ng, ny, m = sizes
+def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int]) -> Stepping:
+    """Return empty arrays.
+
+    `sizes` are the numbers of bodies, graphics, numbers of y, contact points, pairs, wide rows.
+    """
+    nb, ng, ny, m, pairs, wide = sizes
 
     def whole(*shape: int) -> np.ndarray:
         return np.zeros(shape, dtype=np.int64)
@@ -156,7 +184,15 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int]) -> Stepping
         shift=numbers(nb + 1, 6),
         part=numbers(nb + 1),
         reach=numbers(ng),
+        went=numbers(ng),
         slope=numbers(ny),
+        way=numbers(2, 6),
+        frames=numbers(2, 12),
+        taken=whole(pairs + 1),
+        least=numbers(len(plan.first)),
+        impulse=numbers(ny),
+        middle=numbers(ny),
+        half=numbers(2, ny),
     )
     points = Points(
         slot=whole(m),
@@ -167,12 +203,18 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int]) -> Stepping
         was=whole(m),
         gap=numbers(m),
         point=numbers(m, 3),
+        arm=numbers(m, 2, 3),
         normal=numbers(m, 3),
         tangent=numbers(m, 3),
         H=numbers(m, 2, 3, 6),
         answer=numbers(m, 2, 6, 3),
+        wide=whole(m),
+        many=whole(m),
+        moved=whole(wide),
+        moves=numbers(wide, 6, 3),
         W=numbers(m, 3, 3),
         mu=numbers(m),
+        holds=numbers(m),
         ahead=numbers(m),
         closing=numbers(m),
         r=numbers(m, 3),
@@ -182,5 +224,6 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int]) -> Stepping
     )
     room = 1 << max(4, int(4 * m - 1).bit_length())
     kept = Kept(whole(1), whole(m), np.zeros((m, KEPT_COLUMNS)), whole(room))
-    tally = Tally(np.zeros(TALLY_NUMBERS), whole(TALLY_COUNTS))
+    nc = len(rules.number)
+    tally = Tally(np.zeros(TALLY_NUMBERS), whole(TALLY_COUNTS), numbers(nc, 2), numbers(nc))
     return Stepping(rules, plan, motion, points, kept, tally)

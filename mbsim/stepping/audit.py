@@ -3,6 +3,7 @@
 * what the solver left: the change of a velocity that one more sweep would make, over what it may
   be by the tolerance;
 * penetration at the step's begin;
+* of steps as long as the deck says: how far impacts leave them off (`stepping.halves`);
 * friction over mu N;
 * residuals of constraints and their rates.
 
@@ -20,6 +21,8 @@ from mbsim.arrays.codes import (
     CONE,
     LARGEST_FRICTION,
     PENETRATION,
+    STEP_END,
+    STEP_ROWS,
     STEPS_ALL,
     STEPS_SINCE,
     UNSOLVED_IMPULSES,
@@ -33,9 +36,14 @@ from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.scales import fill_squares
 from mbsim.dynamics.pipeline.audit import note
 from mbsim.stepping.arrays import (
+    END_OFF,
+    ENDED,
+    FASTEST,
+    FIXED,
     LEFT,
     POINTS,
     RESIDUAL,
+    ROWS_OFF,
     STEP_LENGTH,
     Stepping,
 )
@@ -44,17 +52,20 @@ from mbsim.stepping.arrays import (
 CONE_ROUNDING = 1e-12
 #: Depth that steps explain, over the scene's length times tol.
 EXPLAINED = 10.0
+#: Part of a step before its end in which rows are those of its end.
+SHORT = 1e-6
 
 
 @jitable
 def examine_points(scene: Scene, S: Stepping, t: float) -> None:
     """Note the largest depth, and the most that friction is beyond its cone."""
-    P, tol = S.points, scene.audit.plan[AUDIT_TOL]
+    P, tol, deepest = S.points, scene.audit.plan[AUDIT_TOL], S.tally.deepest
+    for c in range(len(deepest)):
+        if deepest[c] > 0.0:
+            length = scene.scales.length[scene.scales.of_contact[c]]
+            note(scene, PENETRATION, deepest[c], EXPLAINED * tol * length, t, c)
     for k in range(S.tally.count[POINTS]):
         c = P.contact[k]
-        length = scene.scales.length[scene.scales.of_contact[c]]
-        if P.gap[k] < 0.0:
-            note(scene, PENETRATION, -P.gap[k], EXPLAINED * tol * length, t, c)
         if P.r[k, 0] == 0.0 or P.mu[k] == 0.0:
             continue
         most = P.mu[k] * P.r[k, 0]
@@ -63,6 +74,22 @@ def examine_points(scene: Scene, S: Stepping, t: float) -> None:
         across = math.hypot(P.r[k, 1], P.r[k, 2])
         beyond = max(0.0, across / most - 1.0 - CONE_ROUNDING)
         note(scene, CONE, beyond, tol, t, c)
+
+
+@jitable
+def explained(scene: Scene, S: Stepping) -> float:
+    """Return what the tolerance explains of a position, where the fastest contact of a step is."""
+    length = scene.scales.length[scene.scales.of_contact[int(S.tally.number[FASTEST])]]
+    return EXPLAINED * scene.audit.plan[AUDIT_TOL] * length
+
+
+@jitable
+def examine_row(scene: Scene, S: Stepping, t: float) -> None:
+    """Note how far a row within a step of given length may be from the motion."""
+    number = S.tally.number
+    inside = number[ENDED] - t
+    if number[ROWS_OFF] > 0.0 and SHORT * number[STEP_LENGTH] < inside < number[STEP_LENGTH]:
+        note(scene, STEP_ROWS, number[ROWS_OFF], explained(scene, S), t, int(number[FASTEST]))
 
 
 @jitable
@@ -75,6 +102,9 @@ def examine_step(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> None:
     allowed = S.plan.number[LEFT] / number[STEP_LENGTH]
     note(scene, UNSOLVED_IMPULSES, number[RESIDUAL], allowed, t, -1)
     examine_points(scene, S, t)
+    if S.plan.number[FIXED] == 1.0 and len(scene.contacts.id) > 0:
+        number[ENDED] = t
+        note(scene, STEP_END, number[END_OFF], explained(scene, S), t, int(number[FASTEST]))
     tally[STEPS_SINCE] += 1.0
     if tally[STEPS_SINCE] < scene.audit.plan[AUDIT_EVERY]:
         return
@@ -85,4 +115,5 @@ def examine_step(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> None:
         tally[USUAL_ENERGY] = max(tally[USUAL_ENERGY], energy)
     if scene.world.hooks[Hook.JOINTS] != 0:
         joints = scene.world.hooks[Hook.JOINTS]
+        note_failure(scene, call_int(joints, (scene, Joints.READY, t, y, y)))
         note_failure(scene, call_int(joints, (scene, Joints.AUDIT, t, y, y)))

@@ -14,7 +14,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbsim.errors import ModelError
-from mbsim.laws.abi import FRICTION_INPUTS, LOCI_IN, NFORCE_IN, TIME_IN, X_IN, XDOT_IN
+from mbsim.laws.abi import (
+    FRICTION_INPUTS,
+    LOCI_IN,
+    MEMORY_OUT,
+    NFORCE_IN,
+    TIME_IN,
+    X_IN,
+    XDOT_IN,
+)
 from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
 from mbsim.model.names import element_name
 from mbsim.stepping.arrays import (
@@ -34,6 +42,8 @@ if TYPE_CHECKING:
 _LAW = ctypes.CFUNCTYPE(
     ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p
 )
+#: Numbers of memory of any law at most, with those that it carries.
+_MEMORY = max(FRICTION_LAWS[name].memory + FRICTION_LAWS[name].carried for name in FRICTION_LAWS)
 #: Slip speeds at which a law is asked, over the model's own speed: from, to, and how many.
 SLOWEST_ASKED, FASTEST_ASKED, ASKED = 1e-7, 1e2, 721
 #: What friction may change by where a law looks at what rigid contact does not know.
@@ -75,7 +85,11 @@ class Coefficients:
         if contact.cff_type == "COULOMB_OFF":
             number[FIRST_SPEED] = math.inf
             return
-        if contact.cff_type in FRICTION_LAWS and not contact.asks_user:
+        known = contact.cff_type in FRICTION_LAWS
+        if known and contact.asks_user and FRICTION_LAWS[contact.cff_type].memory:
+            # it is asked for what slides, from within a law that keeps how it was stretched
+            raise self._refuse(contact, f"reads no CFFSUB beside cff_type={contact.cff_type}")
+        if known and not contact.asks_user:
             law = FRICTION_LAWS[contact.cff_type]
             if law.of_area:
                 raise self._refuse(
@@ -87,7 +101,7 @@ class Coefficients:
                 )
             if law.memory:
                 # what such a law keeps is the give that rigid contact has not
-                number[FIRST_SPEED] = contact.stiction_trans_vel
+                number[FIRST_SPEED] = SLOWEST_ASKED * float(self.system.scene.world.scale[1])
                 number[STICKING] = max(contact.mu_static, contact.mu_dynamic)
                 curve[:] = contact.mu_dynamic
                 self.said.append(
@@ -124,7 +138,7 @@ class Coefficients:
     def _call(self, c: int, contact: Contact, **changes: Any) -> np.ndarray[Any, Any]:
         """Return Fx, Fy, ... of the contact's law with these inputs changed."""
         table = self.system.scene.contacts
-        given, out = np.zeros(FRICTION_INPUTS), np.zeros(16)
+        given, out = np.zeros(FRICTION_INPUTS + _MEMORY), np.zeros(MEMORY_OUT + _MEMORY)
         given[NFORCE_IN] = changes.get("normal", self.system.load or 1.0)
         given[XDOT_IN : XDOT_IN + 2] = changes["slip"]
         given[TIME_IN], given[X_IN] = changes.get("time", 0.0), changes.get("x", 0.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import LISTINGS
+from mbsim.arrays.codes import LISTINGS, SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.hooks import Contacts, Hook, Joints, failure_or
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, vector_at, view
@@ -17,8 +17,10 @@ from mbsim.dynamics.contact.detection import find_contacts
 from mbsim.dynamics.pipeline.hooks import accept
 from mbsim.dynamics.pipeline.output import no_room, scaled_error
 from mbsim.stepping.arrays import FIXED, Stepping
-from mbsim.stepping.audit import examine_step
-from mbsim.stepping.points import commit_distances
+from mbsim.stepping.audit import examine_row, examine_step
+from mbsim.stepping.friction import overdue
+from mbsim.stepping.halves import take_fixed_step
+from mbsim.stepping.pairs import commit_distances
 from mbsim.stepping.rows import (
     add_lost,
     fill_contacts,
@@ -65,6 +67,7 @@ def serve_contacts(context: int, what: int, t: float, h: float, a: Pointer, b: P
     elif what == Contacts.ENERGY:
         add_lost(scene, y, vector_at(b, scene.rows.energy.shape[1]))
     elif what == Contacts.ROW:
+        examine_row(scene, S, t)
         fill_contacts(scene, S, y, scene.rows.contact[scene.rows.used[0]])
     return 0
 
@@ -75,7 +78,11 @@ def step(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     S = view(scene.world.hooks[Hook.STEPPING], Stepping)
     n = scene.rows.y.shape[1]
     length, committed = abs(h), h > 0.0
-    code = take_step(scene, S, t, length, vector_at(a, n), vector_at(b, n), committed)
+    y, new = vector_at(a, n), vector_at(b, n)
+    if S.plan.number[FIXED] == 1.0:
+        code = take_fixed_step(scene, S, t, length, y, new)
+    else:
+        code = take_step(scene, S, t, length, y, new, committed)
     return failure_or(scene, code)
 
 
@@ -86,7 +93,10 @@ def norm(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
     if S.plan.number[FIXED] == 1.0:
         return 0.0
     n = scene.rows.y.shape[1]
-    return scaled_error(scene, math.inf if h > 0.0 else h, vector_at(a, n), vector_at(b, n))
+    error = scaled_error(scene, math.inf if h > 0.0 else h, vector_at(a, n), vector_at(b, n))
+    # what would have slid for so long, at the model's own acceleration V^2/L
+    part = overdue(S, h) * scene.world.scale[SCALE_SPEED] / scene.world.scale[SCALE_LENGTH]
+    return max(error, 0.5 * part * part) if h > 0.0 else error
 
 
 def commit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:

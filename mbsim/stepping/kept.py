@@ -145,6 +145,27 @@ def recall(S: Stepping, h: float) -> None:
 
 
 @jitable
+def share_sticking(S: Stepping) -> None:
+    """Let all points of a pair stick where their friction in sum is less than it may be.
+
+    How they share it is not determined.
+    """
+    kept, begin = S.kept, 0
+    while begin < kept.count[0]:
+        end, most, total = begin, 0.0, (0.0, 0.0, 0.0)
+        while end < kept.count[0] and kept.key[end] == kept.key[begin]:
+            force, n = vector(kept.table[end, KEPT_FORCE:]), vector(kept.table[end, KEPT_NORMAL:])
+            normal = dot(force, n)
+            total = add(total, sub(force, scale(normal, n)))
+            most += kept.table[end, KEPT_STICKS] * normal
+            end += 1
+        held = dot(total, total) < (1.0 - 1e-9) * most * most
+        for row in range(begin, end):
+            kept.table[row, KEPT_STICKS] = 1.0 if held else 0.0
+        begin = end
+
+
+@jitable
 def keep_points(scene: Scene, S: Stepping) -> None:
     """Keep the points that press in the step that is taken."""
     P, kept, M = S.points, S.kept, S.motion
@@ -168,9 +189,8 @@ def keep_points(scene: Scene, S: Stepping) -> None:
         i, j = P.body[k, 0], P.body[k, 1]
         x, z = velocity_of(P.H, k, 1, M.v, i, j), velocity_of(P.H, k, 2, M.v, i, j)
         values[KEPT_SLIP] = (x * x + z * z) ** 0.5
-        limit = P.mu[k] * P.r[k, 0]
-        held = P.r[k, 1] ** 2 + P.r[k, 2] ** 2 < (1.0 - 1e-9) * limit * limit
-        values[KEPT_STICKS] = 1.0 if held else 0.0
+        # see `share_sticking`
+        values[KEPT_STICKS] = P.mu[k]
         n, t = vector(P.normal[k]), vector(P.tangent[k])
         b = cross(n, t)
         force = add(scale(P.r[k, 0], n), add(scale(P.r[k, 1], t), scale(P.r[k, 2], b)))
@@ -180,3 +200,4 @@ def keep_points(scene: Scene, S: Stepping) -> None:
             values[KEPT_FORCE + c] = force[c] / h
         row += 1
     kept.count[0] = row
+    share_sticking(S)

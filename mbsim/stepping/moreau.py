@@ -42,15 +42,15 @@ def one_step(p: Problem, m: Method, t: float, h: float) -> int:
 
 
 @jitable
-def bends(m: Method, h: float, i: int) -> bool:
-    """Return whether the body whose numbers begin at i met nothing in the step.
+def bends(y: F1, new: F1, h: float, i: int) -> bool:
+    """Return whether the body whose numbers begin at i met nothing in the step from y to `new`.
 
     Its way is that of the mean of its velocities then, and bent as they change.
     """
     off, way = 0.0, 0.0
     for c in range(i, i + 3):
-        v, u = m.y[c + SHIFT], m.trial[c + SHIFT]
-        off = max(off, abs(m.trial[c] - m.y[c] - 0.5 * h * (v + u)))
+        v, u = y[c + SHIFT], new[c + SHIFT]
+        off = max(off, abs(new[c] - y[c] - 0.5 * h * (v + u)))
         way = max(way, abs(0.5 * h * (u - v)))
     return off <= 1e-6 * way
 
@@ -78,7 +78,7 @@ def fit_dense(m: Method, h: float, d: F2) -> None:
         d[2, i] = 0.0
     i = 0
     while i + SPIN + 3 <= len(y) and m.kinds[i] == POSITION:
-        if bends(m, h, i):
+        if bends(y, w, h, i):
             for c in range(i, i + 3):
                 d[2, c] = -0.5 * h * (w[c + SHIFT] - y[c + SHIFT])
             first, last = turns(y, i), turns(w, i)

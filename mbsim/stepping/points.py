@@ -1,24 +1,16 @@
-"""Which contact points a step looks at: those that touch, and those that may within the step.
-
-Detection is that of compliant contact (`contact.detection`): the same pairs, kernels and slots.
-A pair is measured where it may close within the step: by the distance that it had when measured
-last, less what its shapes have moved since and may move in the step.
-"""
+"""Contact points of a step: rows of measured pairs, and what impulses at them do."""
 
 from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import ACTIVE, FCL_CALLS, NARROWPHASE, SKIPPED, WANTED
-from mbsim.arrays.hooks import Hook
+from mbsim.arrays.hooks import Hook, Joints, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1, V3
-from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import any_tangent, cross, norm, sub, vector
-from mbsim.dynamics.bodies.kinematics import place_graphics, position
-from mbsim.dynamics.contact.detection import keep_places, measure_pair
+from mbsim.core.rotation import any_tangent, cross, norm, vector
+from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.forces import IGNORE_DEEPER, sides
 from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT
 from mbsim.stepping.arrays import POINTS, Stepping
@@ -49,103 +41,81 @@ def fill_reach(scene: Scene, S: Stepping, h: float) -> None:
 
 
 @jitable
-def add_row(scene: Scene, S: Stepping, pair: int, s: int, reach: float) -> bool:
-    """Take row s of a pair as a contact point if it may close; return False if there is no room."""
+def deepest_of(scene: Scene, S: Stepping, pair: int) -> float:
+    """Return the largest depth of a measured pair."""
+    deepest, first = -math.inf, scene.pairs.slot[pair]
+    for s in range(first, first + S.plan.rows[scene.pairs.kind[pair]]):
+        deepest = max(deepest, scene.work.points[s, AT_DEPTH])
+    return deepest
+
+
+@jitable
+def is_point(scene: Scene, pair: int, s: int) -> bool:
+    """Return whether row s of a pair may carry a force."""
+    point, c = scene.work.points[s], scene.kinds.contact[scene.pairs.kind[pair]]
+    return (
+        point[AT_WEIGHT] > LEAST and not point[AT_DEPTH] > scene.contacts.numbers[c, IGNORE_DEEPER]
+    )
+
+
+@jitable
+def put_place(scene: Scene, S: Stepping, pair: int, s: int, gi: int, gj: int) -> int:
+    """Make row s of a pair a contact point, but for gap and arms; return which, -1 for no room."""
     P, point = S.points, scene.work.points[s]
-    depth, kind = point[AT_DEPTH], scene.pairs.kind[pair]
-    if point[AT_WEIGHT] <= LEAST or -depth > reach:
-        return True
-    if depth <= 0.0 and S.plan.near[kind] == 0:
-        return True
-    c = scene.kinds.contact[kind]
-    if depth > scene.contacts.numbers[c, IGNORE_DEEPER]:
-        return True
     k = S.tally.count[POINTS]
     if k == len(P.slot):
-        return False
+        return -1
     S.tally.count[POINTS] = k + 1
-    gi, gj = sides(scene, s)
-    P.slot[k], P.contact[k], P.gap[k] = s, c, -depth
+    P.slot[k], P.contact[k] = s, scene.kinds.contact[scene.pairs.kind[pair]]
     P.body[k, 0], P.body[k, 1] = scene.graphics.body[gi], scene.graphics.body[gj]
     same = scene.pairs.graphic_i[pair] * len(scene.graphics.body) + scene.pairs.graphic_j[pair]
     P.key[k], P.row[k] = same, s - scene.pairs.slot[pair]
     n = vector(point[AT_NORMAL:])
     x = any_tangent(n)
     for j in range(3):
-        P.point[k, j], P.normal[k, j], P.tangent[k, j] = point[AT_POINT + j], n[j], x[j]
-    return True
+        P.normal[k, j], P.tangent[k, j] = n[j], x[j]
+    return k
 
 
 @jitable
-def take_rows(scene: Scene, S: Stepping, pair: int, reach: float, committed: bool) -> bool:
-    """Take what a measured pair has; return False if there is no room."""
-    pairs, kind = scene.pairs, scene.pairs.kind[pair]
-    deepest = -math.inf
-    for s in range(pairs.slot[pair], pairs.slot[pair] + S.plan.rows[kind]):
-        deepest = max(deepest, scene.work.points[s, AT_DEPTH])
-        if not add_row(scene, S, pair, s, reach):
-            return False
-    if committed:
-        pairs.gap[pair] = pairs.left[pair] = -deepest
-    return True
+def add_row(
+    scene: Scene, S: Stepping, y: F1, pair: int, s: int, within: tuple[float, float]
+) -> bool:
+    """Take row s of a pair as a contact point if its gap is within (beyond, up to) these.
 
-
-@jitable
-def find_points(scene: Scene, S: Stepping, y: F1, h: float, committed: bool) -> int:
-    """Fill the list of points that a step h from y looks at; return 0 or a code.
-
-    At a committed state what is found of distances is kept.
+    Return False if there is no room.
     """
-    pairs, work, log = scene.pairs, scene.work, scene.log
-    S.tally.count[POINTS] = 0
-    if not place_graphics(scene, y):
-        return Code.TOO_FAR
-    if pairs.count[WANTED] > 0:
-        return Code.CROWDED
-    fill_reach(scene, S, h)
-    waiting, measured = 0, 0
-    for c in range(len(work.beyond)):
-        work.beyond[c] = 0
-    for k in range(pairs.count[ACTIVE]):
-        pair = pairs.active[k]
-        gi, gj = pairs.graphic_i[pair], pairs.graphic_j[pair]
-        reach = S.motion.reach[gi] + S.motion.reach[gj]
-        if pairs.left[pair] - work.travel[gi] - work.travel[gj] > reach:
-            continue
-        measured += 1
-        if not measure_pair(scene, pair):
-            work.fcl[waiting] = pair
-            waiting += 1
-        elif not take_rows(scene, S, pair, reach, committed):
-            return Code.NO_ROOM
-    log.counters[NARROWPHASE] += measured
-    log.counters[SKIPPED] += pairs.count[ACTIVE] - measured
-    if waiting == 0:
-        return 0
-    log.counters[FCL_CALLS] += waiting
-    code = call_int(scene.world.hooks[Hook.FCL], (waiting,))
-    if code != 0:
-        return code
-    for k in range(waiting):
-        pair = work.fcl[k]
-        keep_places(scene, pair)
-        reach = S.motion.reach[pairs.graphic_i[pair]] + S.motion.reach[pairs.graphic_j[pair]]
-        if not take_rows(scene, S, pair, reach, False):
-            return Code.NO_ROOM
-    return 0
+    P, point = S.points, scene.work.points[s]
+    gap = -point[AT_DEPTH]
+    if not within[0] < gap <= within[1] or not is_point(scene, pair, s):
+        return True
+    gi, gj = sides(scene, s)
+    k = put_place(scene, S, pair, s, gi, gj)
+    if k < 0:
+        return False
+    c = P.contact[k]
+    S.tally.deepest[c] = max(S.tally.deepest[c], -gap)
+    P.gap[k] = gap
+    for side in range(2):
+        x = position(scene, y, P.body[k, side])
+        for j in range(3):
+            P.point[k, j] = point[AT_POINT + j]
+            P.arm[k, side, j] = point[AT_POINT + j] - x[j]
+    return True
 
 
 @jitable
-def commit_distances(scene: Scene) -> None:
-    """Take what shapes have moved from the distance of every pair."""
-    pairs, travel = scene.pairs, scene.work.travel
-    for k in range(pairs.count[ACTIVE]):
-        pair = pairs.active[k]
-        pairs.left[pair] -= travel[pairs.graphic_i[pair]] + travel[pairs.graphic_j[pair]]
+def take_rows(scene: Scene, S: Stepping, y: F1, pair: int, within: tuple[float, float]) -> bool:
+    """Take what a measured pair has that may close; return False if there is no room."""
+    first = scene.pairs.slot[pair]
+    for s in range(first, first + S.plan.rows[scene.pairs.kind[pair]]):
+        if not add_row(scene, S, y, pair, s, within):
+            return False
+    return True
 
 
 @jitable
-def put_side(scene: Scene, S: Stepping, y: F1, k: int, side: int, axes: tuple[V3, V3, V3]) -> None:
+def put_side(scene: Scene, S: Stepping, k: int, side: int, axes: tuple[V3, V3, V3]) -> None:
     """Fill H, and what impulses do, of one body of point k; `axes` are n, x, y or less them."""
     P, b = S.points, S.points.body[k, side]
     H, answer = P.H[k, side], P.answer[k, side]
@@ -154,7 +124,7 @@ def put_side(scene: Scene, S: Stepping, y: F1, k: int, side: int, axes: tuple[V3
             for c in range(6):
                 H[a, c] = answer[c, a] = 0.0
         return
-    arm = sub(vector(P.point[k]), position(scene, y, b))
+    arm = vector(P.arm[k, side])
     for a in range(3):
         turn = cross(arm, axes[a])
         for c in range(3):
@@ -169,20 +139,96 @@ def put_side(scene: Scene, S: Stepping, y: F1, k: int, side: int, axes: tuple[V3
 
 
 @jitable
-def fill_point(scene: Scene, S: Stepping, y: F1, k: int) -> None:
-    """Fill H, the answers to impulses, W and the closing speed of point k."""
+def add_moved(S: Stepping, k: int, b: int) -> bool:
+    """Let body b be one that point k moves; False if there is no room."""
+    P = S.points
+    row = P.wide[k] + P.many[k]
+    if row >= len(P.moved):
+        return False
+    P.moved[row] = b
+    P.many[k] += 1
+    return True
+
+
+@jitable
+def list_moved(S: Stepping, k: int) -> bool:
+    """Fill which bodies point k moves, behind those of the points before; False if no room."""
+    P, plan = S.points, S.plan
+    P.many[k] = 0
+    i, j = P.body[k, 0], P.body[k, 1]
+    for side in range(2):
+        b = i if side == 0 else j
+        g = plan.group[b]
+        if g < 0:
+            if b < len(S.motion.inverse) and not add_moved(S, k, b):
+                return False
+            continue
+        if side == 1 and g == plan.group[i]:
+            continue
+        for m in range(plan.first[g], plan.first[g + 1]):
+            if not add_moved(S, k, plan.members[m]):
+                return False
+    return True
+
+
+@jitable
+def widen(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
+    """Fill what impulses at point k do where joints hold its bodies, as rows from `begin` on.
+
+    Return False if there is no room.
+    """
+    P, plan, impulse = S.points, S.plan, S.motion.impulse
+    P.wide[k] = -1
+    if plan.group[P.body[k, 0]] < 0 and plan.group[P.body[k, 1]] < 0:
+        return True
+    P.wide[k] = begin
+    if not list_moved(S, k):
+        return False
+    for a in range(3):
+        for b in range(6 * len(S.motion.inverse)):
+            impulse[b] = 0.0
+        for side in range(2):
+            b = P.body[k, side]
+            if plan.group[b] >= 0:
+                for c in range(6):
+                    impulse[6 * b + c] += P.H[k, side, a, c]
+        joints = scene.world.hooks[Hook.JOINTS]
+        note_failure(scene, call_int(joints, (scene, Joints.IMPULSE, 0.0, impulse, impulse)))
+        for row in range(begin, begin + P.many[k]):
+            b = P.moved[row]
+            side = 0 if b == P.body[k, 0] else 1
+            for c in range(6):
+                held = plan.group[b] >= 0
+                P.moves[row, c, a] = impulse[6 * b + c] if held else P.answer[k, side, c, a]
+    # what its own bodies do
+    for row in range(begin, begin + P.many[k]):
+        for side in range(2):
+            if P.moved[row] == P.body[k, side]:
+                for c in range(6):
+                    for a in range(3):
+                        P.answer[k, side, c, a] = P.moves[row, c, a]
+    return True
+
+
+@jitable
+def fill_point(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
+    """Fill H, the answers to impulses, W and the closing speed of point k; False if no room.
+
+    `begin` is the first of the wide rows that are not in use.
+    """
     P, M = S.points, S.motion
     n, x = vector(P.normal[k]), vector(P.tangent[k])
     z = cross(n, x)
-    put_side(scene, S, y, k, 0, (n, x, z))
+    put_side(scene, S, k, 0, (n, x, z))
     put_side(
         scene,
         S,
-        y,
         k,
         1,
         ((-n[0], -n[1], -n[2]), (-x[0], -x[1], -x[2]), (-z[0], -z[1], -z[2])),
     )
+    if not widen(scene, S, k, begin):
+        return False
     i, j = P.body[k, 0], P.body[k, 1]
     for a in range(3):
         for c in range(3):
@@ -195,3 +241,4 @@ def fill_point(scene: Scene, S: Stepping, y: F1, k: int) -> None:
     for d in range(6):
         u += P.H[k, 0, 0, d] * M.before[i, d] + P.H[k, 1, 0, d] * M.before[j, d]
     P.closing[k] = u
+    return True

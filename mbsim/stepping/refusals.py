@@ -15,12 +15,8 @@ if TYPE_CHECKING:
 
 def _refused(model: Model) -> Iterator[tuple[str, Mapping[int, Any], str]]:
     """Yield statement, elements and why they are not run."""
-    held = "it has no constraints beside contacts yet"
-    yield "Constraint_Joint", model.joints, held
-    yield "Constraint_Jprim", model.primitives, held
-    yield "Constraint_Coupler", model.couplers, held
-    yield "Motion_Joint", model.motions, held
-    yield "Constraint_General", model.general_constraints, held
+    bound = "a joint's bounds are those of a compliant law"
+    yield "Force_JointLimit", model.joint_limits, bound
     for name in FORCES:
         kind = FORCES[name]
         if isinstance(kind.form, OfResidual):
@@ -29,7 +25,8 @@ def _refused(model: Model) -> Iterator[tuple[str, Mapping[int, Any], str]]:
         elif isinstance(kind.form, Switched):
             why = "what switches within a step is located by methods that estimate their error"
             yield kind.statement, model.table(kind.name), why
-    yield "Force_JointFriction", model.joint_frictions, held
+    friction = "friction in joints follows from their reactions, which impulses do not give"
+    yield "Force_JointFriction", model.joint_frictions, friction
     patches = {i: c for i, c in model.contacts.items() if c.contact_depth == "FIELD"}
     yield "Force_Contact", patches, "a field of depth has no contact points"
     posts = {i: c for i, c in model.contacts.items() if c.cpost is not None}

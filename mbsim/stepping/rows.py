@@ -128,9 +128,7 @@ def watch_peaks(scene: Scene, S: Stepping, t: float) -> None:
     for c in range(len(net)):
         for j in range(3):
             net[c, j] = 0.0
-    for k in range(S.tally.count[POINTS]):
-        c = S.points.contact[k]
-        log[c, PEAK_DEPTH] = max(log[c, PEAK_DEPTH], -S.points.gap[k])
+        log[c, PEAK_DEPTH] = max(log[c, PEAK_DEPTH], S.tally.deepest[c])
     for row in range(S.kept.count[0]):
         values = S.kept.table[row]
         c = int(values[KEPT_CONTACT])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numba import types
 
-from mbsim.arrays.codes import SCALE_LENGTH
+from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.hooks import Hook
 from mbsim.core import jit
 from mbsim.core.address import pack
@@ -23,7 +23,9 @@ from mbsim.stepping.arrays import (
     NEWTONS,
     PLAN_NUMBERS,
     PROJECTED,
+    PUSH_SPEED,
     SLOP,
+    SOME_AHEAD,
     UNSOLVED,
     Plan,
     Stepping,
@@ -34,6 +36,7 @@ from mbsim.stepping.coefficients import Coefficients
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
     from mbsim.compile_model.pairing import Kind
+    from mbsim.core.arrays import I1 as Indices
 
 _INT, _T, _PTR = types.int64, types.float64, types.CPointer(types.float64)
 _CONTACTS = _INT(_INT, _INT, _T, _T, _PTR, _PTR)
@@ -56,9 +59,25 @@ COMPLIANT = frozenset(
     }
 )
 #: Pairs whose rows are features that may meet where the shapes are apart too.
-APART = frozenset({"SPHERE-PLANE", "SPHERE-SPHERE", "SPHERE-BOX", "BOX-PLANE", "ELLIPSOID-PLANE"})
+APART = frozenset(
+    {
+        "SPHERE-PLANE",
+        "SPHERE-SPHERE",
+        "SPHERE-BOX",
+        "SPHERE-CYLINDER",
+        "SPHERE-FRUSTUM",
+        "SPHERE-MESH",
+        "BOX-PLANE",
+        "CYLINDER-PLANE",
+        "FRUSTUM-PLANE",
+        "ELLIPSOID-PLANE",
+        "MESH-PLANE",
+    }
+)
 #: Contact points of a body at most, in the mean.
 POINTS_EACH = 64
+#: Velocities of bodies that joints hold, by impulses of all points, are at most so many.
+MOST_WIDE = 200_000
 #: A gap, or what a position changes by, counts from this part of tol L on; what the solver may
 #: leave of a velocity is that part of tol L / h.
 COUNTS, LEAVES = 0.1, 3e-3
@@ -101,8 +120,43 @@ def _plan(system: System, fixed: bool, tol: float) -> Plan:
     number = np.zeros(PLAN_NUMBERS)
     length = float(scene.world.scale[SCALE_LENGTH])
     number[FIXED] = float(fixed)
+    group, members, first = _groups(system)
+    number[SOME_AHEAD] = float(not near.all())
+    number[PUSH_SPEED] = float(scene.world.scale[SCALE_SPEED])
     number[SLOP], number[LEFT] = COUNTS * tol * length, LEAVES * tol * length
-    return Plan(number, near, rows)
+    return Plan(number, near, rows, group, members, first)
+
+
+def _groups(system: System) -> tuple[Indices, Indices, Indices]:
+    """Return the group of each body that joints hold, -1 for others; members and their firsts."""
+    scene = system.scene
+    tree, eq, nb = scene.tree, scene.equations, len(scene.bodies.mass)
+    # by roots of trees, which equations join
+    root = {int(k): int(k) for k in tree.root}
+
+    def top(k: int) -> int:
+        while root[k] != k:
+            k = root[k]
+        return k
+
+    for e in range(len(eq.program)):
+        held = []
+        for k in range(eq.first[e], eq.first[e + 1]):
+            for marker in (eq.i[k], eq.j[k]):
+                index = int(tree.of_body[scene.markers.body[marker]]) if marker >= 0 else -1
+                if index >= 0:
+                    held.append(top(int(tree.root[index])))
+        for other in held[1:]:
+            root[top(other)] = top(held[0])
+    groups: dict[int, list[int]] = {}
+    for k, body in enumerate(tree.body):
+        groups.setdefault(top(int(tree.root[k])), []).append(int(body))
+    group = np.full(nb + 1, -1, dtype=np.int64)
+    for g, bodies in enumerate(groups.values()):
+        group[bodies] = g
+    members = np.array([b for bodies in groups.values() for b in bodies], dtype=np.int64)
+    sizes = [len(bodies) for bodies in groups.values()]
+    return group, members, np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
 
 
 def _is_patch(kind: Kind) -> bool:
@@ -117,18 +171,26 @@ def rigid_mechanism(system: System, fixed: bool, tol: float) -> Made:
 
     scene = system.scene
     for kind in system.plans.kinds:
+        why = ""
         if _is_patch(kind):
+            why = "touch in patches of triangles, which are no contact points"
+        elif not kind.closed_form:
+            why = "are measured by FCL, which says nothing of how far they are apart"
+        if why:
             contact = system.model.contacts[kind.contact]
             raise ModelError(
                 f"{system.model.file}:{contact.source.line}: Force_Contact[{contact.id}]: "
-                f"integrator MOREAU cannot run this: {kind.shape_i} on {kind.shape_j} touch in "
-                "patches of triangles, which are no contact points; take AUTO"
+                f"integrator MOREAU cannot run this: {kind.shape_i} on {kind.shape_j} {why}; "
+                "take AUTO"
             )
     found = Coefficients(system)
     plan = _plan(system, fixed, tol)
     nb = len(scene.bodies.mass)
     capacity = min(len(scene.slots.pair), POINTS_EACH * (nb + 4))
-    sizes = nb, len(scene.graphics.body), scene.rows.y.shape[1], capacity
+    largest = int(np.diff(plan.first).max(initial=0))
+    wide = min(capacity * 2 * largest, MOST_WIDE) if largest > 0 else 1
+    ng, ny = len(scene.graphics.body), scene.rows.y.shape[1]
+    sizes = nb, ng, ny, capacity, len(scene.pairs.kind), wide
     stepping = make(found.rules, plan, sizes)
     inner, outer = pack(stepping), pack(scene)
     scene.world.hooks[Hook.STEPPING] = int(inner.ctypes.data)

@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from mbsim.core.arrays import F2, F4
+from mbsim.core.arrays import F2, F4, V3
 from mbsim.core.jitable import jitable
 from mbsim.fclib.bodies.solve import solve_contacts
 from mbsim.fclib.one_contact import contact_3d
@@ -43,8 +43,15 @@ def velocity_of(H: F4, k: int, a: int, v: F2, i: int, j: int) -> float:
 
 
 @jitable
-def apply(answer: F4, k: int, v: F2, i: int, j: int, r: tuple[float, float, float]) -> None:
-    """Add what an impulse at point k does to the velocities of its bodies."""
+def apply(p: Points, k: int, v: F2, r: V3) -> None:
+    """Add what an impulse at point k does to the velocities of the bodies that it moves."""
+    if p.wide[k] >= 0:
+        for row in range(p.wide[k], p.wide[k] + p.many[k]):
+            b, moves = p.moved[row], p.moves[row]
+            for c in range(6):
+                v[b, c] += moves[c, 0] * r[0] + moves[c, 1] * r[1] + moves[c, 2] * r[2]
+        return
+    i, j, answer = p.body[k, 0], p.body[k, 1], p.answer
     for c in range(6):
         v[i, c] += answer[k, 0, c, 0] * r[0] + answer[k, 0, c, 1] * r[1] + answer[k, 0, c, 2] * r[2]
         v[j, c] += answer[k, 1, c, 0] * r[0] + answer[k, 1, c, 1] * r[1] + answer[k, 1, c, 2] * r[2]
@@ -68,7 +75,7 @@ def solve_point(p: Points, v: F2, k: int) -> float:
     if dn == 0.0 and dx == 0.0 and dy == 0.0:
         return 0.0
     r[k, 0], r[k, 1], r[k, 2] = sn, sx, sy
-    apply(p.answer, k, v, i, j, (dn, dx, dy))
+    apply(p, k, v, (dn, dx, dy))
     return max(W[k, 0, 0] * abs(dn), max(W[k, 1, 1] * abs(dx), W[k, 2, 2] * abs(dy)))
 
 
@@ -103,7 +110,7 @@ def go_on(p: Points, v: F2, count: int, part: float) -> None:
             for a in range(3):
                 p.way[k, a] = d[a] + p.r[k, a] - p.old[k, a]
                 p.r[k, a] += d[a]
-            apply(p.answer, k, v, p.body[k, 0], p.body[k, 1], d)
+            apply(p, k, v, d)
         else:
             for a in range(3):
                 p.way[k, a] = p.r[k, a] - p.old[k, a] if part == 0.0 else 0.0
@@ -165,7 +172,7 @@ def finish(p: Points, M: Motion, ground: int, count: int, allowed: float) -> int
             return found[4]
     for k in range(count):
         d = (r[k, 0] - p.r[k, 0], r[k, 1] - p.r[k, 1], r[k, 2] - p.r[k, 2])
-        apply(p.answer, k, M.v, p.body[k, 0], p.body[k, 1], d)
+        apply(p, k, M.v, d)
         for a in range(3):
             p.r[k, a] = r[k, a]
     return found[4]
@@ -179,6 +186,15 @@ def begin_anew(p: Points, M: Motion, count: int) -> None:
             M.v[b, c] = M.free[b, c]
     for k in range(count):
         p.r[k, 0] = p.r[k, 1] = p.r[k, 2] = 0.0
+
+
+@jitable
+def some_wide(p: Points, count: int) -> bool:
+    """Return whether joints hold a body of any point: the bodies' masses are not all then."""
+    for k in range(count):
+        if p.wide[k] >= 0:
+            return True
+    return False
 
 
 @jitable
@@ -196,7 +212,7 @@ def solve_points(
     newtons = 0
     if not math.isfinite(left):
         begin_anew(p, M, count)
-    elif count <= NEWTON_POINTS:
+    elif count <= NEWTON_POINTS and not some_wide(p, count):
         newtons = finish(p, M, ground, count, allowed)
     left, more = sweep_on(p, M.v, count, allowed, MOST_SWEEPS)
     if not math.isfinite(left):
@@ -207,11 +223,13 @@ def solve_points(
 
 
 @jitable
-def project_positions(p: Points, shift: F2, count: int, h: float, slop: float) -> int:
+def project_positions(p: Points, shift: F2, count: int, h: float, slop: float, most: float) -> int:
     """Change displacements over h so that no point ends deeper than `slop`; return the sweeps.
 
     The least change in the norm of the mass: gap + h H_n shift >= 0 without friction, pushes start
-    at 0. Where nothing ends so deep nothing changes.
+    at 0. Where nothing ends so deep nothing changes. What begins deeper than `most`, as a deck may
+    begin, comes out by no more than that: a jump in positions is no motion that a shorter step
+    would find.
     """
     for k in range(count):
         p.push[k] = 0.0
@@ -221,13 +239,13 @@ def project_positions(p: Points, shift: F2, count: int, h: float, slop: float) -
         for step in range(count):
             k = count - 1 - step if sweeps % 2 == 1 else step
             i, j = p.body[k, 0], p.body[k, 1]
-            gap = p.gap[k] + h * velocity_of(p.H, k, 0, shift, i, j)
+            gap = max(p.gap[k], -most) + h * velocity_of(p.H, k, 0, shift, i, j)
             if gap >= -0.5 * slop and p.push[k] == 0.0:
                 continue
             wanted = p.push[k] - gap / (h * p.W[k, 0, 0]) if p.W[k, 0, 0] > 0.0 else 0.0
             change = max(wanted, 0.0) - p.push[k]
             p.push[k] += change
-            apply(p.answer, k, shift, i, j, (change, 0.0, 0.0))
+            apply(p, k, shift, (change, 0.0, 0.0))
             worst = max(worst, abs(change) * p.W[k, 0, 0] * h)
         sweeps += 1
     return sweeps

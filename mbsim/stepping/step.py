@@ -43,24 +43,25 @@ from mbsim.stepping.arrays import (
     ALL_POINTS,
     ALL_STEPS,
     ALL_SWEEPS,
-    FIRST_SPEED,
+    KEPT_STICKS,
     LEFT,
     NEWTONS,
     POINTS,
     PRESSING,
     PROJECTED,
+    PUSH_SPEED,
     RESIDUAL,
     RESTITUTION,
     SLOP,
     SLOWEST,
-    SPEEDS,
     STEP_LENGTH,
-    STICKING,
     UNSOLVED,
     Stepping,
 )
+from mbsim.stepping.friction import NOISE, coefficient, keep_loads, let_yield
 from mbsim.stepping.kept import index_kept, recall
-from mbsim.stepping.points import fill_point, fill_reach, find_points, way_at
+from mbsim.stepping.pairs import find_missed, find_points
+from mbsim.stepping.points import fill_point, fill_reach, way_at
 from mbsim.stepping.solver import (
     apply,
     project_positions,
@@ -68,12 +69,17 @@ from mbsim.stepping.solver import (
     velocity_of,
 )
 
-#: Closing speeds have no restitution up to so many times what the solver may leave of one.
-NOISE = 30.0
 #: Newton iterations for the spin of a body at most.
 MOST_SPINS = 12
 #: How much farther than a step can come near pairs are looked for.
 ROOM = 4.0
+#: How often a step is solved at most, as what stuck slips.
+MOST_YIELDS = 6
+#: Overlaps so many times deeper than what does not count are pushed out at a bounded speed.
+DEEP = 5.0
+#: How often a step's contact problem is solved at most, each time with what bodies hit that the
+#: impulses threw at it.
+MOST_ATTEMPTS = 4
 #: Of `Motion.part`: no impact with restitution.
 NO_IMPACT = 2.0
 
@@ -181,7 +187,10 @@ def fill_motion(scene: Scene, S: Stepping, y: F1, h: float) -> None:
         for c in range(3):
             before[c], before[3 + c] = y[at + AT_V + c], w[c]
             free[c] = y[at + AT_V + c] + h * dy[at + AT_V + c]
-        w = spin_freely(scene, y, b, h)
+        if scene.tree.of_body[b] >= 0:
+            w = add(w, scale(h, rotate(R, vector(dy[at + AT_W :]))))
+        else:
+            w = spin_freely(scene, y, b, h)
         for c in range(3):
             free[3 + c] = w[c]
         for r in range(3):
@@ -194,23 +203,10 @@ def fill_motion(scene: Scene, S: Stepping, y: F1, h: float) -> None:
 
 
 @jitable
-def coefficient(S: Stepping, c: int, slip: float) -> float:
-    """Return the coefficient of friction of contact c at a slip speed."""
-    numbers, curve = S.rules.number[c], S.rules.curve[c]
-    if slip <= numbers[FIRST_SPEED]:
-        return numbers[STICKING]
-    at = math.log2(slip / numbers[FIRST_SPEED])
-    k = int(at)
-    if k >= SPEEDS - 1:
-        return curve[SPEEDS - 1]
-    return curve[k] + (at - k) * (curve[k + 1] - curve[k])
-
-
-@jitable
 def look_ahead(S: Stepping, k: int, h: float) -> float:
     """Fill what the normal velocity of point k is held above; return the part before an impact.
 
-    That is 0 where there is no restitution: then the gap is all that may close. Else the point
+    That is NO_IMPACT where there is no restitution: the gap is all that may close. Else the point
     comes in at u, and leaves at e u; what accelerates it goes on behind the impact.
     """
     P, M, rule = S.points, S.motion, S.rules.number[S.points.contact[k]]
@@ -221,9 +217,9 @@ def look_ahead(S: Stepping, k: int, h: float) -> float:
     if gap + h * mean >= 0.0:
         # it does not close by itself
         P.ahead[k] = max(P.ahead[k], -free)
-        return 0.0
+        return NO_IMPACT
     if rule[RESTITUTION] == 0.0 or before >= -max(rule[SLOWEST], NOISE * S.plan.number[LEFT] / h):
-        return 0.0
+        return NO_IMPACT
     part = min(max(gap, 0.0) / (h * -mean), 1.0)
     comes = before + part * (free - before)
     leaves = -rule[RESTITUTION] * comes + (1.0 - part) * (free - before)
@@ -232,38 +228,54 @@ def look_ahead(S: Stepping, k: int, h: float) -> float:
 
 
 @jitable
-def prepare_points(scene: Scene, S: Stepping, y: F1, h: float) -> None:
-    """Fill all that the solver takes, impulses as the last step had them, and velocities so."""
-    P, M, nb = S.points, S.motion, len(scene.bodies.mass)
-    count = S.tally.count[POINTS]
+def prepare_points(scene: Scene, S: Stepping, h: float) -> int:
+    """Fill all that the solver takes, impulses as the last step had them, and velocities so.
+
+    Return 0 or a code.
+    """
+    P, M = S.points, S.motion
+    count, begin = S.tally.count[POINTS], 0
     for k in range(count):
-        fill_point(scene, S, y, k)
+        if not fill_point(scene, S, k, begin):
+            return Code.NO_ROOM
+        begin += P.many[k] if P.wide[k] >= 0 else 0
+    recall(S, h)
+    for k in range(count):
         i, j = P.body[k, 0], P.body[k, 1]
         x, z = velocity_of(P.H, k, 1, M.before, i, j), velocity_of(P.H, k, 2, M.before, i, j)
-        P.mu[k] = coefficient(S, P.contact[k], math.hypot(x, z))
-    for b in range(nb + 1):
+        slip, row = math.hypot(x, z), P.was[k]
+        if row >= 0 and slip <= NOISE * S.plan.number[LEFT] / h:
+            # what stuck moves by what the solver left of it
+            slip = 0.0 if S.kept.table[row, KEPT_STICKS] == 1.0 else slip
+        P.holds[k] = coefficient(S, P.contact[k], slip)
+    return 0
+
+
+@jitable
+def start_impulses(S: Stepping, h: float, ground: int) -> None:
+    """Fill what impulses have to bring about, and velocities with them as they stand."""
+    P, M = S.points, S.motion
+    for b in range(ground + 1):
         M.part[b] = NO_IMPACT
         for c in range(6):
             M.v[b, c] = M.free[b, c]
-    recall(S, h)
-    for k in range(count):
+    for k in range(S.tally.count[POINTS]):
         part = look_ahead(S, k, h)
-        if part > 0.0:
-            for side in range(2):
-                b = P.body[k, side]
-                M.part[b] = min(M.part[b], part)
+        for side in range(2):
+            b = P.body[k, side]
+            M.part[b] = min(M.part[b], part)
         if P.r[k, 0] > 0.0:
             r = (P.r[k, 0], P.r[k, 1], P.r[k, 2])
-            apply(P.answer, k, M.v, P.body[k, 0], P.body[k, 1], r)
+            apply(P, k, M.v, r)
 
 
 @jitable
 def spread_parts(S: Stepping, count: int, h: float, slop: float, ground: int) -> None:
-    """Find the bodies that a contact stops in the step, and all that press on them.
+    """Find the bodies that a contact stops in the step, all that press on them, and joints hold.
 
     Between two bodies of different parts a contact that stays closed would open or go deeper.
     """
-    P, M = S.points, S.motion
+    P, M, plan = S.points, S.motion, S.plan
     for b in range(ground + 1):
         if M.part[b] == NO_IMPACT:
             M.part[b] = 0.5
@@ -284,6 +296,15 @@ def spread_parts(S: Stepping, count: int, h: float, slop: float, ground: int) ->
             if M.part[i] != M.part[j]:
                 M.part[i] = M.part[j] = min(M.part[i], M.part[j])
                 changed = True
+        for g in range(len(plan.first) - 1):
+            least, most = math.inf, 0.0
+            for m in range(plan.first[g], plan.first[g + 1]):
+                least = min(least, M.part[plan.members[m]])
+                most = max(most, M.part[plan.members[m]])
+            if most > least:
+                changed = True
+                for m in range(plan.first[g], plan.first[g + 1]):
+                    M.part[plan.members[m]] = least
 
 
 @jitable
@@ -327,25 +348,35 @@ def add_losses(scene: Scene, S: Stepping, new: F1) -> None:
 
 
 @jitable
-def solve_step(scene: Scene, S: Stepping, h: float) -> int:
+def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
     """Find impulses and displacements of the points at hand; return 0 or a code."""
     P, M, tally = S.points, S.motion, S.tally
     count, nb = tally.count[POINTS], len(scene.bodies.mass)
+    start_impulses(S, h, nb)
     slop = S.plan.number[SLOP]
     allowed = S.plan.number[LEFT] / h
     left, sweeps = 0.0, 0
-    if count > 0:
-        left, sweeps, newtons = solve_points(P, M, nb, count, allowed)
+    for k in range(count):
+        P.mu[k] = P.holds[k]
+    for _ in range(MOST_YIELDS if count > 0 else 0):
+        left, more, newtons = solve_points(P, M, nb, count, allowed)
+        sweeps += more
         tally.count[NEWTONS] += newtons
         if not math.isfinite(left):
             return Code.NOT_FINITE
+        if not let_yield(S, count, allowed):
+            break
+    keep_loads(S, count, committed)
     spread_parts(S, count, h, slop, nb)
     for b in range(nb):
         for c in range(6):
             M.shift[b, c] = M.part[b] * M.before[b, c] + (1.0 - M.part[b]) * M.v[b, c]
-    pushes = project_positions(P, M.shift, count, h, slop)
+    most = max(DEEP * slop, h * S.plan.number[PUSH_SPEED])
+    pushes = project_positions(P, M.shift, count, h, slop, most)
     number = tally.number
-    number[RESIDUAL], number[STEP_LENGTH] = left, h
+    # of two halves that make one step the worse one counts
+    number[RESIDUAL] = left if committed else max(left, number[RESIDUAL])
+    number[STEP_LENGTH] = h
     tally.count[ALL_SWEEPS] += sweeps
     tally.count[ALL_STEPS] += 1
     tally.count[ALL_POINTS] += count
@@ -359,11 +390,57 @@ def solve_step(scene: Scene, S: Stepping, h: float) -> int:
 
 
 @jitable
+def solve_by_middle(scene: Scene, S: Stepping, t: float, h: float, y: F1, committed: bool) -> int:
+    """Solve the step with forces and accelerations as they are in its midst; return 0 or a code.
+
+    Where that is follows from the step with those of its begin: what rests then stays there.
+    """
+    M, middle, dy = S.motion, S.motion.middle, S.motion.slope
+    for k in range(BODY_SIZE * len(scene.bodies.mass), len(y)):
+        middle[k] = y[k] + 0.5 * h * dy[k]
+    for b in range(len(scene.bodies.mass)):
+        for c in range(6):
+            # of velocities alone: the displacement is that of `shift`
+            M.v[b, c] = 0.5 * (M.before[b, c] + M.v[b, c])
+    move_bodies(scene, S, y, 0.5 * h, middle)
+    code = find_forces(scene, t + 0.5 * h, middle, dy)
+    if code != 0:
+        return code
+    place_bodies(scene, y)
+    fill_motion(scene, S, y, h)
+    return solve_step(scene, S, h, committed)
+
+
+@jitable
+def solve_all(scene: Scene, S: Stepping, t: float, h: float, y: F1, committed: bool) -> int:
+    """Solve the step with all points that its motion reaches; return 0 or a code."""
+    for attempt in range(MOST_ATTEMPTS):
+        code = prepare_points(scene, S, h)
+        if code == 0:
+            code = solve_step(scene, S, h, committed)
+        if code != 0:
+            return code
+        missed = 0
+        if S.tally.count[PRESSING] > 0 and attempt < MOST_ATTEMPTS - 1:
+            missed = find_missed(scene, S, y, h)
+        if missed < 0:
+            return -missed
+        if missed == 0:
+            break
+    if scene.world.hooks[Hook.APPLIED] != 0 or scene.world.hooks[Hook.JOINTS] != 0:
+        return solve_by_middle(scene, S, t, h, y, committed)
+    return 0
+
+
+@jitable
 def take_step(
     scene: Scene, S: Stepping, t: float, h: float, y: F1, new: F1, committed: bool
 ) -> int:
     """Fill the state a step h after (t, y); return 0 or a code."""
     dy = S.motion.slope
+    if committed:
+        for c in range(len(S.tally.deepest)):
+            S.tally.deepest[c] = 0.0
     code = find_forces(scene, t, y, dy)
     if code != 0:
         return code
@@ -374,8 +451,7 @@ def take_step(
     code = find_points(scene, S, y, h, committed)
     if code != 0:
         return code
-    prepare_points(scene, S, y, h)
-    code = solve_step(scene, S, h)
+    code = solve_all(scene, S, t, h, y, committed)
     if code != 0:
         return code
     for k in range(BODY_SIZE * len(scene.bodies.mass), len(y)):

@@ -157,6 +157,42 @@ def test_impacts_between_walls_are_told_apart_and_rows_between_them_are_right(to
     assert results.audit.line.startswith("contact problems are solved to")
 
 
+def walls(h: float, print_interval: float) -> mbsim.results.Results:
+    """Return a run of a ball between two walls by steps of h."""
+    fixed = f'<Param_Transient h_max="{h}" h_min="{h}"/></Model>'
+    deck = (MODELS / "poisson_walls.xml").read_text().replace("</Model>", fixed)
+    return mbsim.simulate(deck, integrator="MOREAU", print_interval=print_interval)
+
+
+@pytest.mark.parametrize("h", [0.05, 0.01, 0.0025])
+def test_an_impact_at_the_begin_of_a_fixed_step_rebounds_whole(h: float) -> None:
+    """The gap there is 0 but for rounding; rows at the ends of steps are exact."""
+    results = walls(h, 0.05)
+    times = [0.0, 0.1, 0.35, 0.6625, 1.053125]
+    speeds, places = [-2.0, 1.6, -1.28, 1.024, -0.8192], [0.3, 0.1, 0.5, 0.1, 0.5]
+    k = np.searchsorted(times, results["time"] + 1e-9, side="right") - 1
+    exact = np.array(places)[k] + np.array(speeds)[k] * (results["time"] - np.array(times)[k])
+    assert np.abs(results["bodies/2/position"][:, 2] - exact).max() < 1e-12
+    assert results.audit.warnings == ()
+
+
+def test_rows_within_a_fixed_step_of_an_impact_are_told() -> None:
+    """Between the ends of such a step rows lie on a line: 1/4 h |change of velocity| off."""
+    entry = walls(0.05, 0.01).audit.entries["step_rows"]
+    assert entry.excess > 1.0
+    assert entry.element == "Force_Contact[301]"
+    assert entry.value == pytest.approx(0.25 * 0.05 * 2.304, rel=0.6)
+
+
+def test_two_impacts_within_a_fixed_step_are_told() -> None:
+    """A step of 0.4 has two or three of them: how far that leaves positions off, when and where."""
+    results = walls(0.4, 0.4)
+    entry = results.audit.entries["step_end"]
+    assert entry.element == "Force_Contact[301]"
+    assert entry.value > 0.1
+    assert any("steps of the deck's length are too long" in said for said in results.audit.warnings)
+
+
 def test_rows_of_what_spins_are_right_between_steps() -> None:
     """A free ball at 33 rad/s about y: its attitude at every row is that of the angle turned."""
     ball = (

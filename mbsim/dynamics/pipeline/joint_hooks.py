@@ -27,6 +27,7 @@ from mbsim.core.rotation import add, cross, dot, vector
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.constraints.equations import MISMATCH, fill_matrix, hold, power_of_equations
 from mbsim.dynamics.constraints.folding import passes_fold
+from mbsim.dynamics.constraints.impulses import answer_impulses, answer_tree, make_ready
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.projection import (
     displace,
@@ -97,10 +98,22 @@ def return_to_equations(scene: Scene, t: float, y: F1) -> None:
 
 
 @jitable
+def serve_impulses(scene: Scene, what: int, t: float, y: F1, dy: F1) -> int:
+    """Do what impulses are asked for; return 0."""
+    if what == Joints.READY:
+        make_ready(scene, t, y)
+    else:
+        answer_impulses(scene, dy)
+    return 0
+
+
+@jitable
 def serve(scene: Scene, what: int, t: float, y: F1, dy: F1) -> int:
     """Do what joints are asked for (`Joints`); return 0 or a code."""
     if what == Joints.ACCELERATE:
         return constrain(scene, t, y, dy)
+    if what == Joints.READY or what == Joints.IMPULSE:
+        return serve_impulses(scene, what, t, y, dy)
     if what == Joints.PROJECT_TREE:
         quality = scene.sweep.quality
         drift, drifter = quality[DRIFT], quality[DRIFTER]
@@ -154,9 +167,11 @@ def serve_tree_joints(scene: Scene, what: int, t: float, y: F1, dy: F1) -> int:
         for i in range(len(reaction)):
             reaction[i] = 0.0
         add_tree_reactions(scene, y, scene.sweep.a, reaction)
-    elif what == Joints.MATRIX:
+    elif what == Joints.MATRIX or what == Joints.READY:
         place_bodies(scene, y)
         prepare(scene, y)
+    elif what == Joints.IMPULSE:
+        answer_tree(scene, dy)
     elif what == Joints.PROJECT or what == Joints.ALONG:
         place_bodies(scene, y)
         project_tree(scene, y)

@@ -1,0 +1,215 @@
+"""Pairs that may meet within a step and give no points while they are apart: where they will.
+
+Cylinders on boxes and on each other, polyhedra, ellipsoids on what is not flat: apart, their closed
+forms give a lower bound of the distance. Such a pair is moved ahead by no more than that bound lets
+it, again and again, until it overlaps or the step is over (conservative advancement: B. Mirtich,
+Impulse-based Dynamic Simulation of Rigid Body Systems, Berkeley 1996, section 2.3). Where it
+overlaps its rows are contact points as of any other pair; their gaps are what the same motion
+leaves of them at the step's begin. So nothing passes through anything, however thin.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1, V3
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
+from mbsim.dynamics.bodies.kinematics import position
+from mbsim.dynamics.contact.detection import measure_pair
+from mbsim.dynamics.contact.forces import sides
+from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT
+from mbsim.stepping.arrays import Motion, Stepping
+from mbsim.stepping.points import deepest_of, is_point, put_place
+
+#: A pair goes ahead by this part of its whole motion at least, and so beyond where it touches.
+LEAST_PART = 0.01
+#: From where it touches it goes on by so much of the smaller shape, within the step: corners that
+#: come down a little later in it are points too.
+FURTHER = 0.02
+#: Motions that are looked at before impulses are known: of both bodies, and of either one alone,
+#: as what lies on something that is held, or is held by something.
+BOTH, ONLY_I, ONLY_J = range(3)
+
+
+@jitable
+def turned(w: V3, t: float, a: V3) -> V3:
+    """Return vector a turned by angular velocity w for a time t."""
+    size = norm(w)
+    if size == 0.0:
+        return a
+    e, angle = scale(1.0 / size, w), size * t
+    c, s = math.cos(angle), math.sin(angle)
+    along = scale((1.0 - c) * dot(e, a), e)
+    return add(add(scale(c, a), scale(s, cross(e, a))), along)
+
+
+@jitable
+def place_ahead(scene: Scene, y: F1, g: int, begin: F1, way: F1, t: float) -> None:
+    """Write the frame of graphic g after a time t of the motion `way`; `begin` is that of now."""
+    frame, x = scene.work.frames[g], position(scene, y, scene.graphics.body[g])
+    w = (way[3], way[4], way[5])
+    centre = add(add(x, scale(t, vector(way))), turned(w, t, sub(vector(begin), x)))
+    for k in range(3):
+        frame[k] = centre[k]
+        axis = turned(w, t, (begin[3 + k], begin[6 + k], begin[9 + k]))
+        for c in range(3):
+            frame[3 + 3 * c + k] = axis[c]
+
+
+@jitable
+def fastest_point(scene: Scene, g: int, way: F1) -> float:
+    """Bound how fast turning moves any point of graphic g."""
+    spin = norm((way[3], way[4], way[5]))
+    if spin == 0.0:
+        return 0.0
+    return spin * (scene.graphics.radius[g] + norm(vector(scene.graphics.p[g])))
+
+
+@jitable
+def measure_ahead(scene: Scene, S: Stepping, y: F1, pair: int, t: float) -> float:
+    """Measure a pair after a time t of `M.way`; return its largest depth."""
+    M = S.motion
+    gi, gj = scene.pairs.graphic_i[pair], scene.pairs.graphic_j[pair]
+    place_ahead(scene, y, gi, M.frames[0], M.way[0], t)
+    place_ahead(scene, y, gj, M.frames[1], M.way[1], t)
+    measure_pair(scene, pair)
+    return deepest_of(scene, S, pair)
+
+
+@jitable
+def find_touch(scene: Scene, S: Stepping, y: F1, pair: int, h: float, depth: float) -> float:
+    """Return the time at which a pair overlaps first in a step h by `M.way`, -1 for never.
+
+    `depth` is its largest one now. Its rows are those of that time, or a little later.
+    """
+    gi, gj = scene.pairs.graphic_i[pair], scene.pairs.graphic_j[pair]
+    a, b = S.motion.way[0], S.motion.way[1]
+    speed = norm((a[0] - b[0], a[1] - b[1], a[2] - b[2]))
+    speed += fastest_point(scene, gi, a) + fastest_point(scene, gj, b)
+    if not 0.0 < speed < math.inf:
+        return -1.0
+    t = 0.0
+    while depth <= 0.0:
+        if speed * (h - t) < -depth:
+            return -1.0
+        t += max(-depth / speed, LEAST_PART * h)
+        if t > h:
+            return -1.0
+        depth = measure_ahead(scene, S, y, pair, t)
+    size = min(scene.graphics.radius[gi], scene.graphics.radius[gj])
+    later = min(h, t + FURTHER * size / speed)
+    if measure_ahead(scene, S, y, pair, later) > 0.0:
+        return later
+    measure_ahead(scene, S, y, pair, t)
+    return t
+
+
+@jitable
+def choose_way(scene: Scene, S: Stepping, pair: int, which: int) -> None:
+    """Fill `M.way` by the mean motion of the pair's bodies without impulses, or of one of them."""
+    M = S.motion
+    for side in range(2):
+        g = scene.pairs.graphic_i[pair] if side == 0 else scene.pairs.graphic_j[pair]
+        b = scene.graphics.body[g]
+        moves = which == BOTH or which - ONLY_I == side
+        for c in range(6):
+            M.way[side, c] = 0.5 * (M.before[b, c] + M.free[b, c]) if moves else 0.0
+
+
+@jitable
+def add_ahead(scene: Scene, S: Stepping, y: F1, s: int, pair: int, t: float, apart: bool) -> bool:
+    """Take row s, measured at time t of `M.way`, as a contact point; False if there is no room."""
+    P, M, point = S.points, S.motion, scene.work.points[s]
+    if point[AT_DEPTH] <= 0.0 or not is_point(scene, pair, s):
+        return True
+    gi, gj = sides(scene, s)
+    k = put_place(scene, S, pair, s, gi, gj)
+    if k < 0:
+        return False
+    p, n = vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
+    closing = 0.0
+    for side in range(2):
+        g, b = (gi, P.body[k, 0]) if side == 0 else (gj, P.body[k, 1])
+        # the pair's order may be another one than the contact's
+        way = M.way[0] if g == scene.pairs.graphic_i[pair] else M.way[1]
+        v, w = vector(way), (way[3], way[4], way[5])
+        x = position(scene, y, b)
+        arm = sub(p, add(x, scale(t, v)))
+        speed = dot(n, add(v, cross(w, arm)))
+        closing += speed if side == 0 else -speed
+        for c in range(3):
+            P.arm[k, side, c] = arm[c]
+            P.point[k, c] = x[c] + arm[c]
+    P.gap[k] = -point[AT_DEPTH] - t * closing
+    if apart:
+        P.gap[k] = max(P.gap[k], 0.0)
+    else:
+        S.tally.deepest[P.contact[k]] = max(S.tally.deepest[P.contact[k]], -P.gap[k])
+    return True
+
+
+@jitable
+def take_ahead(scene: Scene, S: Stepping, y: F1, pair: int, t: float, apart: bool) -> bool:
+    """Take what a pair has at time t of `M.way`, and put it back; False if there is no room."""
+    first, M = scene.pairs.slot[pair], S.motion
+    room = True
+    for s in range(first, first + S.plan.rows[scene.pairs.kind[pair]]):
+        room = room and add_ahead(scene, S, y, s, pair, t, apart)
+    M.taken[pair] = M.taken[len(M.taken) - 1]
+    return room
+
+
+@jitable
+def put_back(scene: Scene, M: Motion, pair: int) -> None:
+    """Let the frames of a pair be those of now."""
+    for side in range(2):
+        g = scene.pairs.graphic_i[pair] if side == 0 else scene.pairs.graphic_j[pair]
+        for c in range(12):
+            scene.work.frames[g, c] = M.frames[side, c]
+
+
+@jitable
+def keep_frames(scene: Scene, M: Motion, pair: int) -> None:
+    """Keep the frames of a pair as they are now."""
+    for side in range(2):
+        g = scene.pairs.graphic_i[pair] if side == 0 else scene.pairs.graphic_j[pair]
+        for c in range(12):
+            M.frames[side, c] = scene.work.frames[g, c]
+
+
+@jitable
+def look_ahead_of(scene: Scene, S: Stepping, y: F1, pair: int, h: float, depth: float) -> bool:
+    """Take the points of a measured pair that meets within the step; False if there is no room."""
+    M, room = S.motion, True
+    keep_frames(scene, M, pair)
+    for which in range(3):
+        choose_way(scene, S, pair, which)
+        t = find_touch(scene, S, y, pair, h, depth)
+        if t >= 0.0:
+            room = take_ahead(scene, S, y, pair, t, depth <= 0.0)
+            break
+    put_back(scene, M, pair)
+    return room
+
+
+@jitable
+def meets_after_all(scene: Scene, S: Stepping, y: F1, pair: int, h: float) -> bool:
+    """Take the points of a pair that meets by the motion that impulses gave it, if it does.
+
+    Return False if there is no room.
+    """
+    M, room = S.motion, True
+    keep_frames(scene, M, pair)
+    for side in range(2):
+        g = scene.pairs.graphic_i[pair] if side == 0 else scene.pairs.graphic_j[pair]
+        b = scene.graphics.body[g]
+        for c in range(6):
+            M.way[side, c] = M.shift[b, c]
+    measure_pair(scene, pair)
+    t = find_touch(scene, S, y, pair, h, deepest_of(scene, S, pair))
+    if t >= 0.0:
+        room = take_ahead(scene, S, y, pair, t, True)
+    put_back(scene, M, pair)
+    return room

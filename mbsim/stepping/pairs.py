@@ -1,0 +1,115 @@
+"""Which contact points a step looks at: those that touch, and those that may within the step.
+
+Detection is that of compliant contact (`contact.detection`): the same pairs, kernels and slots.
+A pair is measured where it may close within the step: by the distance that it had when measured
+last, less what its shapes have moved since and may move in the step. What impulses threw at
+something farther off is found behind the contact problem, which is then solved with it.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.codes import ACTIVE, NARROWPHASE, SKIPPED, WANTED
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1
+from mbsim.core.codes import Code
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import norm, vector
+from mbsim.dynamics.bodies.kinematics import place_graphics
+from mbsim.dynamics.contact.detection import measure_pair
+from mbsim.stepping.ahead import look_ahead_of, meets_after_all
+from mbsim.stepping.arrays import POINTS, SOME_AHEAD, Stepping
+from mbsim.stepping.points import deepest_of, fill_reach, take_rows
+
+
+@jitable
+def find_points(scene: Scene, S: Stepping, y: F1, h: float, committed: bool) -> int:
+    """Fill the list of points that a step h from y looks at; return 0 or a code.
+
+    At a committed state what is found of distances is kept.
+    """
+    pairs, work, log, M = scene.pairs, scene.work, scene.log, S.motion
+    S.tally.count[POINTS] = 0
+    M.taken[len(M.taken) - 1] += 1
+    if not place_graphics(scene, y):
+        return Code.TOO_FAR
+    if pairs.count[WANTED] > 0:
+        return Code.CROWDED
+    fill_reach(scene, S, h)
+    measured = 0
+    for c in range(len(work.beyond)):
+        work.beyond[c] = 0
+    for k in range(pairs.count[ACTIVE]):
+        pair = pairs.active[k]
+        gi, gj = pairs.graphic_i[pair], pairs.graphic_j[pair]
+        reach = S.motion.reach[gi] + S.motion.reach[gj]
+        if pairs.left[pair] - work.travel[gi] - work.travel[gj] > reach:
+            continue
+        measured += 1
+        measure_pair(scene, pair)
+        depth = deepest_of(scene, S, pair)
+        if committed:
+            pairs.gap[pair] = pairs.left[pair] = -depth
+        if S.plan.near[pairs.kind[pair]] == 1:
+            room = take_rows(scene, S, y, pair, (-math.inf, reach))
+        else:
+            room = look_ahead_of(scene, S, y, pair, h, depth)
+        if not room:
+            return Code.NO_ROOM
+    log.counters[NARROWPHASE] += measured
+    log.counters[SKIPPED] += pairs.count[ACTIVE] - measured
+    return 0
+
+
+@jitable
+def fill_went(scene: Scene, S: Stepping, h: float) -> bool:
+    """Bound how far points of graphics go by what impulses gave; True if farther than expected."""
+    graphics, M, farther = scene.graphics, S.motion, False
+    for g in range(len(graphics.body)):
+        way = M.shift[graphics.body[g]]
+        far, spin = norm(vector(way)), norm((way[3], way[4], way[5]))
+        if spin > 0.0:
+            far += spin * (graphics.radius[g] + norm(vector(graphics.p[g])))
+        M.went[g] = h * far
+        farther = farther or M.went[g] > M.reach[g]
+    return farther
+
+
+@jitable
+def find_missed(scene: Scene, S: Stepping, y: F1, h: float) -> int:
+    """Take points that only the motion behind impulses reaches; return how many, or less a code."""
+    pairs, work, M = scene.pairs, scene.work, S.motion
+    before = S.tally.count[POINTS]
+    farther = fill_went(scene, S, h)
+    if not farther and S.plan.number[SOME_AHEAD] == 0.0:
+        return 0
+    for k in range(pairs.count[ACTIVE]):
+        pair = pairs.active[k]
+        gi, gj = pairs.graphic_i[pair], pairs.graphic_j[pair]
+        went = M.went[gi] + M.went[gj]
+        if pairs.left[pair] - work.travel[gi] - work.travel[gj] > went:
+            continue
+        room = True
+        if S.plan.near[pairs.kind[pair]] == 1:
+            reach = M.reach[gi] + M.reach[gj]
+            if went > reach:
+                measure_pair(scene, pair)
+                room = take_rows(scene, S, y, pair, (reach, went))
+        elif M.taken[pair] != M.taken[len(M.taken) - 1]:
+            room = meets_after_all(scene, S, y, pair, h)
+        if not room:
+            return -Code.NO_ROOM
+    if farther:
+        for g in range(len(M.reach)):
+            M.reach[g] = max(M.reach[g], M.went[g])
+    return S.tally.count[POINTS] - before
+
+
+@jitable
+def commit_distances(scene: Scene) -> None:
+    """Take what shapes have moved from the distance of every pair."""
+    pairs, travel = scene.pairs, scene.work.travel
+    for k in range(pairs.count[ACTIVE]):
+        pair = pairs.active[k]
+        pairs.left[pair] -= travel[pairs.graphic_i[pair]] + travel[pairs.graphic_j[pair]]
