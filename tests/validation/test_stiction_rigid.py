@@ -396,10 +396,10 @@ def test_boxes_of_one_size_on_each_other_hold_a_push(method, damping, tmp_path):
     # whose corners touch is not to be said by rounding: edges lie on each other
     boxes, ids = "", []
     for k in range(3):
-        marker = 20 + 10 * k
+        marker, z = 20 + 10 * k, 0.05 + 0.1 * k
         boxes += f"""
 <Body_Rigid id="{2 + k}" cg_id="{marker}" mass="1" inertia_xx="0.001667" inertia_yy="0.001667"
-  inertia_zz="0.001667"/><Reference_Marker id="{marker}" body_id="{2 + k}" pos_z="{0.05 + 0.1 * k}"/>
+  inertia_zz="0.001667"/><Reference_Marker id="{marker}" body_id="{2 + k}" pos_z="{z}"/>
 <Post_Graphic id="{10 * marker}" type="BoxDefinedFromCenter" center_marker_id="{marker}"
   length_x="0.1" length_y="0.1" length_z="0.1"/>"""
         ids.append(str(10 * marker))

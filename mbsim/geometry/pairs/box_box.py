@@ -54,8 +54,8 @@ BOX_BOX_SLOTS = 12
 FACES_FIRST = 1e-6
 #: Edges nearer to parallel than this (sine squared) give no axis of their own: the faces do.
 PARALLEL = 1e-16
-#: Corners of I that are outside of J's face by less than this part of its size are on it: where boxes
-#: of one size lie on each other rounding would say at every evaluation anew whose corners touch.
+#: Corners of I that are outside of J's face by less than this part of its size are on it: where
+#: boxes of one size lie on each other rounding would say at every evaluation whose corners touch.
 TIE = 1e-10
 #: Vertices a scratch polygon holds: 8, and some for what rounding may add.
 CAPACITY = 12

@@ -115,9 +115,9 @@ def _dynamic_limit(inputs: FrictionInput, mu_dynamic: float) -> float:
     return mu_dynamic * inputs.nforce if math.isnan(inputs.limit) else inputs.limit
 
 
-#: What `rigid` keeps: mode, d (before it touches, along x, a slip that is none to the tolerance), and
-#: the force that held, which is given where it is to be shown; in
-#: place of that force, while it slips, the speed at the committed state, and that at which it was
+#: What `rigid` keeps: mode, d (before it touches, along x, a slip that is none to the tolerance),
+#: and the force that held, which is given where it is to be shown; in place of that force, while it
+#: slips, the speed at the committed state, and that at which it was
 #: let go: what sticks moves as its neighbours let it, that is by how they turn over its depth.
 KEPT_MODE, KEPT_X, KEPT_Y, STICKING_X, STICKING_Y = range(5)
 KEPT_SPEED, KEPT_PLAY = STICKING_X, STICKING_Y
