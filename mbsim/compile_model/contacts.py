@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -44,7 +43,6 @@ CELLS_EACH = 4
 SKIN = 0.45
 
 
-@functools.cache
 def region_address(name: str) -> int:
     """Return the address of a closed-form pair that is one incident."""
     from mbsim.compile_model import pair_adapter
@@ -63,7 +61,6 @@ def kernel_address(kind: Kind) -> int:
     return pair_address(PAIRS[kind.closed_form])
 
 
-@functools.cache
 def pair_address(pair: Pair) -> int:
     """Return the address of a closed-form pair."""
     from mbsim.compile_model import pair_adapter
@@ -72,7 +69,6 @@ def pair_address(pair: Pair) -> int:
     return jit.address(adapted, pair_adapter.SIGNATURE, allocates=True)
 
 
-@functools.cache
 def near_address(name: str, rows: int) -> int:
     """Return the address of what gives the points of a pair that is apart too, in `rows` rows."""
     from mbsim.compile_model import pair_adapter

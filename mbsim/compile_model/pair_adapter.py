@@ -6,6 +6,7 @@ and numbers alone: an intrinsic among them would have another key in every proce
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -20,6 +21,7 @@ _POINTER = types.CPointer(types.float64)
 SIGNATURE = types.int64(_POINTER, _POINTER, _POINTER, _POINTER, _POINTER)
 
 
+@functools.cache
 def adapt_pair(points: Callable[..., int], slots: int) -> Any:
     """Return a pair function as a C function of plain pointers."""
 
@@ -37,6 +39,7 @@ def adapt_pair(points: Callable[..., int], slots: int) -> Any:
     return entry
 
 
+@functools.cache
 def adapt_region(region: Callable[..., tuple[int, float]], whole: float, slots: int) -> Any:
     """Return a pair function with area as a C function that writes its one incident ahead."""
 
