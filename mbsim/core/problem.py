@@ -97,7 +97,7 @@ da being the linearised acceleration under joints and equations. `form` says wha
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from enum import IntEnum
 from typing import Any, NamedTuple
 
@@ -140,12 +140,17 @@ class Problem(NamedTuple):
     step: int = 0  # only for problems that step with contacts of their own
 
 
-def addresses(hooks: Mapping[str, Callable[..., Any]]) -> dict[str, int]:
-    """Return the addresses of compiled hooks, by their names in `Problem`."""
+def addresses(
+    hooks: Mapping[str, Callable[..., Any]], allocating: Container[str] = ALLOCATING
+) -> dict[str, int]:
+    """Return the addresses of compiled hooks, by their names in `Problem`.
+
+    `allocating` are those that may make arrays.
+    """
     from mbsim.core import jit
 
     return {
-        name: jit.address(hook, MEASURE if name in MEASURES else HOOK, name in ALLOCATING)
+        name: jit.address(hook, MEASURE if name in MEASURES else HOOK, name in allocating)
         for name, hook in hooks.items()
     }
 

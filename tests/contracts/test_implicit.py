@@ -376,7 +376,7 @@ class Run:
         hooks["project"] = _unit if bodies else zero
         if bodies:
             hooks |= {"retract": _retract, "difference": _difference}
-        self.problem = Problem(int(self._table.ctypes.data), **addresses(hooks))
+        self.problem = Problem(int(self._table.ctypes.data), **addresses(hooks, hooks))
         method = catalog.load(name)
         self.state = scheme.make(method, np.array(y0), 0.0, configuration.kinds(bodies, n))
         self.state.memory[scheme.STEP] = step

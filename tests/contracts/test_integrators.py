@@ -177,7 +177,7 @@ def make_problem(rhs, context=0, norm=_norm2, output=zero, project=zero):
         rhs=rhs, project=project, norm=norm, check=one, commit=zero, look=zero, inner=none,
         limit=far, output=output, reject=zero,
     )  # fmt: skip
-    return Problem(context, **addresses(hooks))
+    return Problem(context, **addresses(hooks, hooks))
 
 
 def _fails(context, t, h, a, b):
@@ -518,6 +518,6 @@ def test_a_hook_that_fails_ends_the_run_with_its_code(name, hook):
         made["inner"] = _half
     # the other problems of this file have no events and no branches
     problem = make_problem(_rough if hook == "reject" else _oscillator)
-    run = Run(name, problem._replace(**addresses(made)), step=0.1)
+    run = Run(name, problem._replace(**addresses(made, made)), step=0.1)
     assert run(5.0, 1e-8, times=[1.0, 2.0]) == FAILED
     assert run.state.counts[scheme.CODE] == 77

@@ -89,7 +89,7 @@ class Kept:
     FIELDS = ("time", "y", "accel", "energy", "applied", "joint", "value")
 
     def __init__(self, rows):
-        self.rows, self.blocks, self.marked = rows, [], 0
+        self.rows, self.blocks, self.marked, self.flushes = rows, [], 0, 0
 
     def take(self):
         """Take the rows away."""

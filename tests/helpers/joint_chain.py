@@ -319,7 +319,7 @@ def problem(chain: Chain) -> tuple[Problem, Any]:
         rhs=_rhs, project=zero, norm=_norm, check=one, commit=zero, look=zero, inner=none,
         limit=far, output=_output, reject=zero,
     )  # fmt: skip
-    return Problem(int(table.ctypes.data), **addresses(hooks)), (table, chain)
+    return Problem(int(table.ctypes.data), **addresses(hooks, hooks)), (table, chain)
 
 
 def exact(count: int, times: np.ndarray, tilt: float = 0.0) -> np.ndarray:

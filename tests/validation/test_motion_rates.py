@@ -9,7 +9,6 @@ import math
 
 import numpy as np
 import pytest
-from numba import carray
 from scipy.spatial.transform import Rotation
 
 import mbsim
@@ -17,7 +16,7 @@ from helpers.decks import write_deck
 from helpers.mechanics import Body
 from helpers.mechanism_decks import Joint, Scene
 from mbsim.arrays import scene as arrays
-from mbsim.core.address import view
+from mbsim.core.address import vector_at, view
 from mbsim.dynamics.pipeline import hooks
 from mbsim.dynamics.pipeline.output import scaled_error
 from mbsim.errors import SolverError
@@ -115,7 +114,7 @@ def _norm_of_differences(context, t, h, a, b):
     n = scene.rows.y.shape[1]
     if h != 0.0:
         return 0.0
-    return scaled_error(scene, h, carray(a, (n,)), carray(b, (n,)))
+    return scaled_error(scene, h, vector_at(a, n), vector_at(b, n))
 
 
 def order_of(folder, name, method, tol, counts):
