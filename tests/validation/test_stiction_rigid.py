@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 import mbsim
 from helpers.decks import contact, drift, run_deck, run_in_pieces, sphere, write_deck
@@ -390,12 +391,10 @@ def test_beside_an_element_of_the_users_own_both_remember(tmp_path):
     assert np.ptp(both["force_elements/7/f"]) > 0.39
 
 
-@pytest.mark.parametrize("damping", [100, 1000])
-@pytest.mark.parametrize("method", ["RADAU5", "GALPHA"])
-def test_boxes_of_one_size_on_each_other_hold_a_push(method, damping, tmp_path):
-    # whose corners touch is not to be said by rounding: edges lie on each other
+def boxes_of_one_size(count, damping):
+    """Return boxes of 1 kg and 0.1 m on each other, which just touch, and their contacts."""
     boxes, ids = "", []
-    for k in range(3):
+    for k in range(count):
         marker, z = 20 + 10 * k, 0.05 + 0.1 * k
         boxes += f"""
 <Body_Rigid id="{2 + k}" cg_id="{marker}" mass="1" inertia_xx="0.001667" inertia_yy="0.001667"
@@ -405,16 +404,46 @@ def test_boxes_of_one_size_on_each_other_hold_a_push(method, damping, tmp_path):
         ids.append(str(10 * marker))
     law = f"""cnf_type="IMPACT" stiffness="1e6" exponent="1" damping="{damping}" dmax="1e-5"
   cff_type="STICTION" mu_static="0.5" mu_dynamic="0.4" tangential_stiffness="INFINITE" """
-    lists = f'num_i_graphics="3" i_graphics_id="{" ".join(ids)}"'
-    model = (
-        plane()
-        + boxes
+    lists = f'num_i_graphics="{count}" i_graphics_id="{" ".join(ids)}"'
+    return (
+        boxes
         + f'<Force_Contact id="301" {lists} {lists.replace("i_", "j_")} {law}/>'
         + f'<Force_Contact id="302" {lists} num_j_graphics="1" j_graphics_id="100" {law}/>'
-        + push("STEP(TIME,0,0,0.5,10)")
     )
+
+
+@pytest.mark.parametrize("damping", [100, 1000])
+@pytest.mark.parametrize("method", ["RADAU5", "GALPHA"])
+def test_boxes_of_one_size_on_each_other_hold_a_push(method, damping, tmp_path):
+    # whose corners touch is not to be said by rounding: edges lie on each other
+    model = plane() + boxes_of_one_size(3, damping) + push("STEP(TIME,0,0,0.5,10)")
     results = run_deck(tmp_path, model, 1.0, 0.1, integrator=method)
     # 10 N are 2.5e-6 m of four contacts of 1e6 N/m that the lowest box turns on
     assert abs(results["bodies/2/position"][-1, :2]).max() < 1e-5
     assert len(results["events"]) < 150
-    assert results.stats["steps"] < 3000
+    assert results.stats["steps"] < 2000
+
+
+@pytest.mark.parametrize("count", [2, 3])
+@pytest.mark.parametrize("method", ["RADAU5", "GALPHA"])
+def test_boxes_of_one_size_on_each_other_slide_as_one(method, count, tmp_path):
+    # what holds a corner that passes an edge holds on there
+    most = 6.0 * count
+    text = plane() + boxes_of_one_size(count, 300) + push(f"STEP(TIME,0,0,0.5,{most!r})")
+    results = run_deck(tmp_path, text, 1.0, 0.1, integrator=method)
+
+    def force(t):
+        part = min(1.0, t / 0.5)
+        return most * part * part * (3.0 - 2.0 * part)
+
+    def moves(t, y):
+        return [y[1], force(t) / count - 0.4 * G]
+
+    begins = brentq(lambda t: force(t) - 0.5 * G * count, 0.0, 0.5, xtol=1e-14)
+    way = solve_ivp(moves, (begins, 1.0), [0.0, 0.0], rtol=1e-11, atol=1e-12).y[0, -1]
+    slips = events(results, "slip")
+    # what it does while it settles is another thing
+    np.testing.assert_allclose(slips[slips > 0.1][0], begins, rtol=0, atol=2e-4)
+    for body in range(2, 2 + count):
+        assert results[f"bodies/{body}/position"][-1, 0] == pytest.approx(way, rel=1e-3)
+    assert results.stats["steps"] < 2000

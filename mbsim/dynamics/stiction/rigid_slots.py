@@ -22,7 +22,7 @@ from mbsim.dynamics.constraints.selection import sticks
 from mbsim.dynamics.contact.forces import contact_of, sides
 from mbsim.dynamics.contact.frames import tangent
 from mbsim.dynamics.stiction.rigid_shares import first_of_slots
-from mbsim.geometry.catalog import AT_NORMAL, AT_POINT
+from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT
 
 #: Half of the time over which rates of a contact's place are found, over that in which the model's
 #: speed goes its length: truncation and rounding are about as large.
@@ -102,10 +102,29 @@ def look_around(scene: Scene, y: F1, pair: int, moment: float) -> None:
 
 
 @jitable
+def holding_row(scene: Scene, s: int) -> int:
+    """Return the candidate where slot s holds: its own, or what has taken over where that was.
+
+    A corner that passes an edge is another row's from there on. What holds it holds on at its
+    place to the end of the step, which is where rows change hands.
+    """
+    points, k = scene.work.look[0], s - scene.pairs.slot[scene.slots.pair[s]]
+    if points[k, AT_DEPTH] > 0.0:
+        return k
+    p, best = vector(scene.state.p[s]), k
+    least = norm(sub(vector(points[k, AT_POINT:]), p))
+    for q in range(scene.kinds.slots[scene.pairs.kind[scene.slots.pair[s]]]):
+        away = norm(sub(vector(points[q, AT_POINT:]), p))
+        if points[q, AT_DEPTH] > 0.0 and away < least:
+            best, least = q, away
+    return best
+
+
+@jitable
 def fill_hold(scene: Scene, t: float, y: F1, s: int, moment: float) -> None:
     """Fill the row of `Work.sticking_point` of slot s, whose pair has been looked at."""
     points, row = scene.work.look, scene.work.sticking_point[s]
-    k = s - scene.pairs.slot[scene.slots.pair[s]]
+    k = holding_row(scene, s)
     now, later, before = points[0, k], points[1, k], points[2, k]
     ahead = sub(vector(later[AT_POINT:]), vector(now[AT_POINT:]))
     back = sub(vector(now[AT_POINT:]), vector(before[AT_POINT:]))

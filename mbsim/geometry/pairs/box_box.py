@@ -56,7 +56,7 @@ FACES_FIRST = 1e-6
 PARALLEL = 1e-16
 #: Corners of I that are outside of J's face by less than this part of its size are on it: where
 #: boxes of one size lie on each other rounding would say at every evaluation whose corners touch.
-TIE = 1e-10
+TIE = 1e-8
 #: Vertices a scratch polygon holds: 8, and some for what rounding may add.
 CAPACITY = 12
 # scratch: R (9), t (3), the overlap along each axis (15)
