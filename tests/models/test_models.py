@@ -432,7 +432,7 @@ def cam_balance(results):
     return np.abs(total - total[0]).max() / results["energy/kinetic"].max()
 
 
-@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 1e-3), (1e-9, 1e-7)])
+@pytest.mark.parametrize(("tol", "allowed"), [(8e-6, 1e-3), (1e-9, 1e-7)])
 def test_cam(tol, allowed):
     results = run_model("cam.xml", tol=tol)
     t, (e, m, k, preload), w = results["time"], CAM, 20 * np.pi
@@ -788,7 +788,8 @@ def test_slider_crank_clearance_for_five_turns(tol, allowed):
 def test_contensou_disc(v, w):
     # v / (R w) = 0.5, 1, 0.67 at first
     starts = [f"Body_Rigid[2].v_ic_x={v}", f"Body_Rigid[2].w_ic_z={w}"]
-    results = run_model("contensou_disc.xml", overrides=starts, end_time=1.0)
+    # at 1e-5 errors of 1e-5 m/s are half of a percent of what is left
+    results = run_model("contensou_disc.xml", overrides=starts, end_time=1.0, tol=1e-6)
     slip = np.linalg.norm(results["bodies/2/velocity"][:, :2], axis=1)
     rim = 0.1 * np.abs(results["bodies/2/angular_velocity"][:, 2])
     slow = np.argmax(slip + rim < 3e-3)

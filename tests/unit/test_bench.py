@@ -331,7 +331,7 @@ def test_integrators_are_those_of_the_scene_unless_asked_for():
     def used(name, *asked):
         return {s.integrator for s in own.settings(scenes[name], asked, [])}
 
-    joined = set(METHODS) - {"VERLET", "MOREAU"}
+    joined = set(METHODS) - {"VERLET"}
     assert used("S2a") == used("S1") == used("S7_125") == used("S7_1000") == set(METHODS)
     assert used("S8_2") == used("S11_lugre") == joined
     assert used("S7_8000") == {"VERLET"}

@@ -194,7 +194,11 @@ def log_leave(scene: Scene, t: float, h: float, y: F1, s: int) -> None:
         v = sub(
             velocity_at(scene, y, graphics.body[gi], p), velocity_at(scene, y, graphics.body[gj], p)
         )
-        log[REBOUND] = max(dot(v, vector(state.n[s])), 0.0) / log[APPROACH]
+        apart = dot(v, vector(state.n[s]))
+        if apart < -rate:
+            # the force was over before, and something slows them: as fast as where they parted
+            apart = -rate + part * (apart + rate)
+        log[REBOUND] = max(apart, 0.0) / log[APPROACH]
     record_event(scene, t - (1.0 - part) * h, LEAVE, s)
 
 

@@ -30,6 +30,8 @@ MOMENT = 1e-5
 #: What of a second difference, over the model's length, is no jump of the point from one place to
 #: another.
 SMOOTH = 1e-8
+#: Row of `Work.look` that shows a pair as it is.
+LOOKED_NOW = 0
 
 
 @jitable
@@ -108,7 +110,8 @@ def holding_row(scene: Scene, s: int) -> int:
     A corner that passes an edge is another row's from there on. What holds it holds on at its
     place to the end of the step, which is where rows change hands.
     """
-    points, k = scene.work.look[0], s - scene.pairs.slot[scene.slots.pair[s]]
+    points = scene.work.look[LOOKED_NOW]
+    k = s - scene.pairs.slot[scene.slots.pair[s]]
     if points[k, AT_DEPTH] > 0.0:
         return k
     p, best = vector(scene.state.p[s]), k
