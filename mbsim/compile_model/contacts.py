@@ -155,6 +155,7 @@ def kinds_table(kinds: list[Kind], contacts: dict[int, int]) -> Kinds:
         step=np.array([k.step for k in kinds], dtype=np.int64),
         moves=np.array([k.moves for k in kinds], dtype=np.int64),
         noise=np.array([0.0 if k.closed_form else _noise(k) for k in kinds]),
+        pressure=np.array(["FIELD" in k.closed_form.split("-") for k in kinds], dtype=np.int64),
     )
 
 

@@ -41,15 +41,8 @@ def thrown(depth, units):
     )
 
 
-#: VERLET with FIELD is left out: before shapes meet its bound of a step takes the stiffness of a
-#: unit of area as that of a point (manual, VOLUME, limits).
-RUNS = [
-    *((depth, method) for depth in DEPTHS for method in ("DOPRI5", "RADAU5")),
-    ("LARGEST", "VERLET"),
-]
-
-
-@pytest.mark.parametrize(("depth", "method"), RUNS)
+@pytest.mark.parametrize("depth", DEPTHS)
+@pytest.mark.parametrize("method", ["DOPRI5", "RADAU5", "VERLET"])
 def test_units_change_nothing(depth, method, tmp_path):
     ends = []
     for units, (unit, _) in UNITS.items():

@@ -172,6 +172,10 @@ def fast_pair(scene: Scene, pair: int, best: F1) -> bool:
     force = push / inverse
     energy = 0.5 * speed * speed / inverse + force * max(0.0, pairs.left[pair])
     inverse += turning(scene, i) + turning(scene, j)
+    if scene.kinds.pressure[pairs.kind[pair]] == 1:
+        # per area: a patch is no larger than the smaller shape
+        area = math.pi * min(graphics.radius[i], graphics.radius[j]) ** 2
+        energy, force, inverse = energy / area, force / area, inverse * area
     if (
         c == best[BEST_CONTACT]
         and energy <= best[BEST_ENERGY]
