@@ -119,30 +119,31 @@ class MemoryGroup:
 
     def visititems(self, note: Callable[[str, Any], None]) -> None:
         """Call with path and member, for all that are below this."""
-        for name, item in self.items():
-            note(name, item)
-            if isinstance(item, MemoryGroup):
-                for below, other in item._below():
-                    note(f"{name}/{below}", other)
+        for path, item in self._below():
+            note(path, item)
 
     def visit(self, note: Callable[[str], None]) -> None:
         """Call with the path of all that are below this."""
         self.visititems(lambda name, item: note(name))
 
     def _below(self) -> Iterator[tuple[str, Any]]:
-        found: list[tuple[str, Any]] = []
-        self.visititems(lambda name, item: found.append((name, item)))
-        return iter(found)
+        for name, item in self.items():
+            yield name, item
+            if isinstance(item, MemoryGroup):
+                for below, other in item._below():
+                    yield f"{name}/{below}", other
 
     def create_group(self, path: str) -> MemoryGroup:
         """Return a group, made with those above it where they are not there."""
-        found: Any = self
+        found: MemoryGroup = self
         for name in path.strip("/").split("/"):
-            if name not in found._members:
-                place = f"{found.name.rstrip('/')}/{name}"
-                found._members[name] = MemoryGroup(found, place)
-            found = found._members[name]
-        return found  # type: ignore[no-any-return]
+            member = found._members.get(name)
+            if member is None:
+                member = MemoryGroup(found, f"{found.name.rstrip('/')}/{name}")
+                found._members[name] = member
+            assert isinstance(member, MemoryGroup)
+            found = member
+        return found
 
     def create_dataset(self, path: str, data: Any) -> MemoryDataset:
         """Return a new dataset, in the place of one that is there."""
