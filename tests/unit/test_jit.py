@@ -92,3 +92,14 @@ def test_files_changed_meanwhile_are_neither_loaded_nor_stored(tmp_path):
     later, more = run("run")
     assert later == value
     assert more > stored
+
+
+def test_what_is_only_counted_has_no_address_that_a_pair_remembers(monkeypatch):
+    # MOREAU asks within `planned`, which counts first: -1 was kept, and called
+    from mbsim.compile_model.contacts import near_address, pair_address
+    from mbsim.geometry.catalog import PAIRS
+
+    answers = iter([jit.NOT_YET, 4096, jit.NOT_YET, 8192])
+    monkeypatch.setattr(jit, "address", lambda *arguments, **more: next(answers))
+    assert [near_address("BOX-BOX", 12) for _ in range(2)] == [jit.NOT_YET, 4096]
+    assert [pair_address(PAIRS["SPHERE-PLANE"]) for _ in range(2)] == [jit.NOT_YET, 8192]
