@@ -23,6 +23,9 @@ ROWS, THIN, DEEP, FIRST, LAST = 0, 9, 15, 21, 22
 
 #: Nodes of more triangles are cut so that neither part has more than this part of them.
 MANY, EVEN = 32, 0.55
+#: Room around the inner points of a layer, as a part of the mesh: a triangle that is flush with the
+#: side of a box meets it where that may be a side between two prisms, and not the surface.
+ROOM = 1e-9
 #: Half edge of a box that holds nothing: it meets none, and its square is a number.
 NOTHING = -1e150
 
@@ -158,7 +161,9 @@ def _boxes_along(
 ) -> Array:
     """Return the rows of nodes that have these axes."""
     outer = np.einsum("tij,tkj->tki", axes[part], corners)
-    both = np.concatenate([outer, np.einsum("tij,tkj->tki", axes[part], inner)], axis=1)
+    below = np.einsum("tij,tkj->tki", axes[part], inner)
+    room = ROOM * float(np.ptp(corners.reshape(-1, 3), axis=0).max())
+    both = np.concatenate([outer, below - room, below + room], axis=1)
     made = np.empty((len(axes), ORIENTED))
     made[:, ROWS:THIN] = axes.reshape(-1, 9)
     for at, points in ((THIN, outer), (DEEP, both)):

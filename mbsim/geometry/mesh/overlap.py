@@ -118,13 +118,16 @@ def place_boxes(mesh: F1, node: int, pose: F1, moves: bool, origin: V3, boxes: F
 
 @jitable
 def reaches(prism: F1, points: int, box: F1) -> bool:
-    """Return whether a placed triangle (3 points), or its prism (6), reaches into a placed box."""
-    c = vector(box)
+    """Return whether a placed triangle (3 points), or its prism (6), reaches into a placed box.
+
+    A side of the prism that is flush with the box may hold a triangle of it.
+    """
+    c, flush = vector(box), 4.0 * FLUSH * (box[12] + box[13] + box[14])
     for r in range(3):
         u, least, most = vector(box, 3 + 3 * r), math.inf, -math.inf
         for k in range(0, 3 * points, 3):
-            height = dot(u, sub(vector(prism, k), c))
-            least, most = min(least, height), max(most, height)
+            height, room = dot(u, sub(vector(prism, k), c)), flush if k >= INNER else 0.0
+            least, most = min(least, height - room), max(most, height + room)
         if least >= box[12 + r] or most <= -box[12 + r]:
             return False
     return True
@@ -275,17 +278,21 @@ def across_both(mesh_i: F1, mesh_j: F1, table: I1, pairs: F2, values: F2, k: int
     psi on the same edge. -1 for none.
     """
     a, b, of_i = int(pairs[k, 0]), int(pairs[k, 1]), e < 3
-    here, mesh = (a, mesh_i) if of_i else (b, mesh_j)
-    at_i = int(mesh_i[AT_TRIANGLES]) + TRIANGLE * a + BESIDE
-    at_j = int(mesh_j[AT_TRIANGLES]) + TRIANGLE * b + BESIDE
-    beyond = int(mesh_i[at_i + e]) if of_i else int(mesh_j[at_j + e - 3])
+    here, there, mesh, other = (a, b, mesh_i, mesh_j) if of_i else (b, a, mesh_j, mesh_i)
+    own, across = (0, 3) if of_i else (3, 0)
+    first = int(other[AT_TRIANGLES]) + BESIDE
+    beyond = int(mesh[int(mesh[AT_TRIANGLES]) + TRIANGLE * here + BESIDE + e - own])
     back = edge_towards(mesh, int(mesh[AT_TRIANGLES]) + TRIANGLE * beyond + BESIDE, here)
     for f in range(3):
-        if of_i:
-            m = table[place_in(table, pairs, beyond, int(mesh_j[at_j + f]))]
-        else:
-            m = table[place_in(table, pairs, int(mesh_i[at_i + f]), beyond)]
-        if m >= 0 and values[m, back if of_i else 3 + back] > 0.0:
+        near = int(other[first + TRIANGLE * there + f])
+        m = table[
+            place_in(table, pairs, beyond, near) if of_i else place_in(table, pairs, near, beyond)
+        ]
+        if m < 0:
+            continue
+        # rounding tells which of both edges bounds the piece there
+        aside = edge_towards(other, first + TRIANGLE * near, there)
+        if max(values[m, own + back], values[m, across + aside]) > 0.0:
             return m
     return -1
 

@@ -2,7 +2,8 @@
 
 The prism under a triangle has three tetrahedra. With its corners a, b, c in the order of their
 numbers in the mesh and a', b', c' their inner points these are a b c c', a b b' c', a a' b' c':
-neighbours cut their common side alike. The depth psi is linear in each.
+neighbours cut their common side alike. The depth psi is linear in each. A triangle that lies in a
+face between two tetrahedra is counted in one of them.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import math
 
 from mbsim.core.arrays import F1, F2, V3, V4
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import add, cross, dot, scale, sub, vector
+from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.geometry.mesh.polygon import CORNERS, begin, cut, integrate
 from mbsim.geometry.mesh.record import BEYOND, MOST, SUMS, add_piece
 from mbsim.model.surface import DEPTH, INNER, ORDER
@@ -21,6 +22,8 @@ from mbsim.model.surface import DEPTH, INNER, ORDER
 SIDE, END, WITHIN = 3, 6, 7
 #: A tetrahedron whose volume is less than this part of its edges' product is flat.
 FLAT = 1e-12
+#: Inner points this near (as a part of the distance) to a plane may be in it.
+TOUCHES = 1e-12
 
 
 @jitable
@@ -30,6 +33,38 @@ def side_between(i: int, j: int) -> int:
     if i + j == 1:
         return SIDE
     return SIDE + 1 if i + j == 3 else SIDE + 2
+
+
+@jitable
+def heights_over(x: V3, y: V3, z: V3, tri: tuple[V3, V3, V3]) -> tuple[V3, V3]:
+    """Return the normal of a face (its length is twice the area) and a triangle's heights over it.
+
+    Corners of a face are given in one order, so both tetrahedra beside it find the same numbers.
+    """
+    n = cross(sub(y, x), sub(z, x))
+    return n, (dot(n, sub(tri[0], x)), dot(n, sub(tri[1], x)), dot(n, sub(tri[2], x)))
+
+
+@jitable
+def outside(h: V3, side: float, keeps: bool) -> bool:
+    """Return whether a triangle has nothing on the side of a face on which `side` h > 0.
+
+    What lies in a face as a whole is counted on one side, where `keeps` says so.
+    """
+    low, high = (
+        min(side * h[0], side * h[1], side * h[2]),
+        max(side * h[0], side * h[1], side * h[2]),
+    )
+    return high < 0.0 or (high == 0.0 and (low < 0.0 or not keeps))
+
+
+@jitable
+def cut_at(polygon: F2, count: int, h: V3, side: float, tag: int, made: F2) -> tuple[F2, F2, int]:
+    """Cut a polygon at a face; return where it is, the other place, and its number of corners."""
+    if min(side * h[0], side * h[1], side * h[2]) >= 0.0:
+        return polygon, made, count
+    f = (side * h[0], side * (h[1] - h[0]), side * (h[2] - h[0]))
+    return made, polygon, cut(polygon, count, f, tag, made)
 
 
 @jitable
@@ -46,55 +81,49 @@ def piece_in_tetrahedron(
     """Add the piece of a triangle in one tetrahedron to a node.
 
     `depths` are psi at the corners, `tags` those of the faces opposite to them. `values` are
-    the largest psi on the edges of the triangle and on the prism's sides (6).
+    the largest psi on the edges of the triangle and on the prism's sides (6). Corners are in the
+    order of the mesh, those of the surface first: both sides of a face have it in one order.
     """
     p, q, r, s = corners
     e, f, g = sub(q, p), sub(r, p), sub(s, p)
-    fg, ge, ef = cross(f, g), cross(g, e), cross(e, f)
-    volume = dot(ef, g)
+    volume = dot(cross(e, f), g)
     if abs(volume) <= FLAT * math.sqrt(dot(e, e) * dot(f, f) * dot(g, g)):
         return
-    over = 1.0 / volume
-    # gradients of the weights of q, r, s; that of p is what is left
-    gq, gr, gs = scale(over, fg), scale(over, ge), scale(over, ef)
-    a, b, c = sub(tri[0], p), sub(tri[1], p), sub(tri[2], p)
-    qa, ra, sa = dot(gq, a), dot(gr, a), dot(gs, a)
-    qb, rb, sb = dot(gq, b), dot(gr, b), dot(gs, b)
-    qc, rc, sc = dot(gq, c), dot(gr, c), dot(gs, c)
-    pa, pb, pc = 1.0 - qa - ra - sa, 1.0 - qb - rb - sb, 1.0 - qc - rc - sc
-    if (
-        max(pa, pb, pc) <= 0.0
-        or max(qa, qb, qc) <= 0.0
-        or max(ra, rb, rc) <= 0.0
-        or max(sa, sb, sc) <= 0.0
-    ):
+    # the corner opposite to a face is above it, or below, by the volume
+    up = 1.0 if volume > 0.0 else -1.0
+    np_, hp = heights_over(q, r, s, tri)
+    if outside(hp, -up, volume < 0.0 or tags[0] == END):
+        return
+    nq, hq = heights_over(p, r, s, tri)
+    if outside(hq, up, volume > 0.0):
+        return
+    nr, hr = heights_over(p, q, s, tri)
+    if outside(hr, -up, volume < 0.0):
+        return
+    ns, hs = heights_over(p, q, r, tri)
+    if outside(hs, up, volume > 0.0):
         return
     first, second = work[:CORNERS], work[CORNERS : 2 * CORNERS]
     count = begin(first)
-    if min(pa, pb, pc) < 0.0:
-        count = cut(first, count, (pa, pb - pa, pc - pa), tags[0], second)
-        first, second = second, first
-    if min(qa, qb, qc) < 0.0:
-        count = cut(first, count, (qa, qb - qa, qc - qa), tags[1], second)
-        first, second = second, first
-    if min(ra, rb, rc) < 0.0:
-        count = cut(first, count, (ra, rb - ra, rc - ra), tags[2], second)
-        first, second = second, first
-    if min(sa, sb, sc) < 0.0:
-        count = cut(first, count, (sa, sb - sa, sc - sa), tags[3], second)
-        first, second = second, first
+    first, second, count = cut_at(first, count, hp, -up, tags[0], second)
+    first, second, count = cut_at(first, count, hq, up, tags[1], second)
+    first, second, count = cut_at(first, count, hr, -up, tags[2], second)
+    first, second, count = cut_at(first, count, hs, up, tags[3], second)
     if count < 3:
         return
-    d = depths
-    at_a = d[0] * pa + d[1] * qa + d[2] * ra + d[3] * sa
-    at_b = d[0] * pb + d[1] * qb + d[2] * rb + d[3] * sb
-    at_c = d[0] * pc + d[1] * qc + d[2] * rc + d[3] * sc
+    # psi is the sum over corners of its depth times the height over the face opposite
+    dp, dq, dr, ds = (
+        -depths[0] / volume, depths[1] / volume, -depths[2] / volume, depths[3] / volume
+    )  # fmt: skip
+    at_a = dp * hp[0] + dq * hq[0] + dr * hr[0] + ds * hs[0]
+    at_b = dp * hp[1] + dq * hq[1] + dr * hr[1] + ds * hs[1]
+    at_c = dp * hp[2] + dq * hq[2] + dr * hr[2] + ds * hs[2]
     psi = (at_a, at_b - at_a, at_c - at_a)
     sums = work[2 * CORNERS :].ravel()
     for k in range(SUMS):
         sums[k] = 0.0
     integrate(first, count, psi, sums)
-    slope = add(scale(d[1] - d[0], gq), add(scale(d[2] - d[0], gr), scale(d[3] - d[0], gs)))
+    slope = add(add(scale(dp, np_), scale(dq, nq)), add(scale(dr, nr), scale(ds, ns)))
     add_piece(node, sums, tri[0], sub(tri[1], tri[0]), sub(tri[2], tri[0]), slope, side, 0.5)
     note_edges(first, count, psi, values)
     for k in range(count):
@@ -150,23 +179,28 @@ def range_of(n: V3, tri: tuple[V3, V3, V3], origin: V3) -> tuple[float, float]:
 
 @jitable
 def apart(outer: tuple[V3, V3, V3], inner: tuple[V3, V3, V3], tri: tuple[V3, V3, V3]) -> bool:
-    """Return whether a triangle has no area in a prism, by one of five directions.
+    """Return whether a triangle has no depth in a prism, by one of five directions.
 
     They are the normals of both triangles and, in the plane of the prism's, those of its edges.
+    What touches the prism in its surface alone has no depth; what touches its inner points may lie
+    in its side, and which of both prisms there has it is not told here.
     """
     n = cross(sub(outer[1], outer[0]), sub(outer[2], outer[0]))
     low, high = range_of(n, tri, outer[0])
-    if low >= 0.0 or high <= min(0.0, range_of(n, inner, outer[0])[0]):
+    if low >= 0.0 or high < min(0.0, range_of(n, inner, outer[0])[0]):
         return True
+    away = TOUCHES * norm(sub(inner[0], tri[0]))
     n_tri = cross(sub(tri[1], tri[0]), sub(tri[2], tri[0]))
     low, high = range_of(n_tri, outer, tri[0])
     if low >= 0.0 or high <= 0.0:
         inner_low, inner_high = range_of(n_tri, inner, tri[0])
-        if min(low, inner_low) >= 0.0 or max(high, inner_high) <= 0.0:
+        room = away * norm(n_tri)
+        if min(low, inner_low - room) >= 0.0 or max(high, inner_high + room) <= 0.0:
             return True
     for k in range(3):
         start = outer[k]
         out = cross(sub(outer[k + 1 if k < 2 else 0], start), n)
-        if range_of(out, tri, start)[0] >= max(0.0, range_of(out, inner, start)[1]):
+        low = range_of(out, tri, start)[0]
+        if low >= 0.0 and low >= range_of(out, inner, start)[1] + away * norm(out):
             return True
     return False
