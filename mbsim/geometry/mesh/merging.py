@@ -92,20 +92,35 @@ def sort_down(values: F1, order: I1) -> None:
 
 
 @jitable
+def told_here(partners: I2, k: int, other: int) -> bool:
+    """Return whether the link of node k to another one is taken from k's row: once of both."""
+    if other > k:
+        return True
+    for e in range(partners.shape[1]):
+        if partners[other, e] == k:
+            return False
+    return True
+
+
+@jitable
 def saddles(above: I1, links: F2, partners: I2) -> tuple[F1, I2]:
     """Return the links between pieces of different peaks: their psi, and the two peaks."""
     count = 0
     for k in range(len(above)):
         for e in range(links.shape[1]):
             other = partners[k, e]
-            if other > k and root_of(above, k) != root_of(above, other):
+            if other < 0 or root_of(above, k) == root_of(above, other):
+                continue
+            if told_here(partners, k, other):
                 count += 1
     levels, ends = np.empty(count), np.empty((count, 2), np.int64)
     count = 0
     for k in range(len(above)):
         for e in range(links.shape[1]):
             other = partners[k, e]
-            if other > k and root_of(above, k) != root_of(above, other):
+            if other < 0 or root_of(above, k) == root_of(above, other):
+                continue
+            if told_here(partners, k, other):
                 levels[count] = links[k, e]
                 ends[count, 0], ends[count, 1] = above[k], above[other]
                 count += 1

@@ -277,8 +277,9 @@ def across_both(mesh_i: F1, mesh_j: F1, table: I1, pairs: F2, values: F2, k: int
     Then the neighbour there has no piece with that triangle, but with one of its neighbours, and
     psi on the same edge. -1 for none.
     """
-    a, b, of_i = int(pairs[k, 0]), int(pairs[k, 1]), e < 3
-    here, there, mesh, other = (a, b, mesh_i, mesh_j) if of_i else (b, a, mesh_j, mesh_i)
+    of_i = e < 3
+    mesh, other = (mesh_i, mesh_j) if of_i else (mesh_j, mesh_i)
+    here, there = int(pairs[k, 0 if of_i else 1]), int(pairs[k, 1 if of_i else 0])
     own, across = (0, 3) if of_i else (3, 0)
     first = int(other[AT_TRIANGLES]) + BESIDE
     beyond = int(mesh[int(mesh[AT_TRIANGLES]) + TRIANGLE * here + BESIDE + e - own])
