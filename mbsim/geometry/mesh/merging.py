@@ -64,17 +64,36 @@ def root_of(above: I1, k: int) -> int:
 
 @jitable
 def lead_up(nodes: F2, links: F2, partners: I2, above: I1) -> None:
-    """Find for each node the highest neighbour that it leads up to, itself for a peak."""
-    for k in range(len(above)):
-        best = k
+    """Find for each node where it leads up to, itself for a peak.
+
+    Pieces whose peaks are one point, or one flat side, are one: together they lead to the highest
+    neighbour that any of them has there. So rounding does not tell to which peak they belong.
+    """
+    count = len(above)
+    for k in range(count):
+        above[k] = k
+    for k in range(count):
+        for e in range(links.shape[1]):
+            other = partners[k, e]
+            if other >= 0 and links[k, e] >= LEADS * max(nodes[k, PEAK], nodes[other, PEAK]):
+                a, b = root_of(above, k), root_of(above, other)
+                above[max(a, b)] = min(a, b)
+    top, best = np.zeros(count), np.full(count, -1)
+    for k in range(count):
+        r = root_of(above, k)
+        top[r] = max(top[r], nodes[k, PEAK])
+    for k in range(count):
+        r = root_of(above, k)
         for e in range(links.shape[1]):
             other = partners[k, e]
             if other < 0 or links[k, e] < LEADS * nodes[k, PEAK]:
                 continue
-            higher = nodes[other, PEAK] - nodes[best, PEAK]
-            if higher > 0.0 or (higher == 0.0 and other > best):
-                best = other
-        above[k] = best
+            high = top[root_of(above, other)]
+            if high > top[r] and (best[r] < 0 or high > top[best[r]]):
+                best[r] = root_of(above, other)
+    for r in range(count):
+        if best[r] >= 0:
+            above[r] = best[r]
 
 
 @jitable

@@ -48,6 +48,9 @@ FEW = 2
 PLACED_BOX = 15
 #: Edges of a pair of triangles.
 EDGES = 6
+#: Part of the largest psi on an edge that the piece beyond it has there at least: it has the same,
+#: but for rounding.
+ALIKE = 0.5
 
 
 @jitable
@@ -271,31 +274,34 @@ def edge_towards(beside: F1, at: int, other: int) -> int:
 
 
 @jitable
-def across_both(mesh_i: F1, mesh_j: F1, table: I1, pairs: F2, values: F2, k: int, e: int) -> int:
-    """Return the node beyond edge e of pair k where that lies on an edge of the other triangle.
+def beyond_edge(mesh_i: F1, mesh_j: F1, table: I1, pairs: F2, values: F2, k: int, e: int) -> int:
+    """Return the node beyond edge e of pair k, -1 for none.
 
-    Then the neighbour there has no piece with that triangle, but with one of its neighbours, and
-    psi on the same edge. -1 for none.
+    It has the same psi there. Where the edge lies on one of the other triangle, the neighbour may
+    have its piece not with that triangle, but with one of its neighbours.
     """
-    of_i = e < 3
+    of_i, enough = e < 3, ALIKE * values[k, e]
     mesh, other = (mesh_i, mesh_j) if of_i else (mesh_j, mesh_i)
     here, there = int(pairs[k, 0 if of_i else 1]), int(pairs[k, 1 if of_i else 0])
     own, across = (0, 3) if of_i else (3, 0)
-    first = int(other[AT_TRIANGLES]) + BESIDE
-    beyond = int(mesh[int(mesh[AT_TRIANGLES]) + TRIANGLE * here + BESIDE + e - own])
-    back = edge_towards(mesh, int(mesh[AT_TRIANGLES]) + TRIANGLE * beyond + BESIDE, here)
+    first, last = int(mesh[AT_TRIANGLES]) + BESIDE, int(other[AT_TRIANGLES]) + BESIDE
+    beyond = int(mesh[first + TRIANGLE * here + e - own])
+    back = own + edge_towards(mesh, first + TRIANGLE * beyond, here)
+    a, b = (beyond, there) if of_i else (there, beyond)
+    direct = table[place_in(table, pairs, a, b)]
+    if direct >= 0 and values[direct, back] >= enough:
+        return direct
     for f in range(3):
-        near = int(other[first + TRIANGLE * there + f])
-        m = table[
-            place_in(table, pairs, beyond, near) if of_i else place_in(table, pairs, near, beyond)
-        ]
+        near = int(other[last + TRIANGLE * there + f])
+        a, b = (beyond, near) if of_i else (near, beyond)
+        m = table[place_in(table, pairs, a, b)]
         if m < 0:
             continue
         # rounding tells which of both edges bounds the piece there
-        aside = edge_towards(other, first + TRIANGLE * near, there)
-        if max(values[m, own + back], values[m, across + aside]) > 0.0:
+        aside = across + edge_towards(other, last + TRIANGLE * near, there)
+        if max(values[m, back], values[m, aside]) >= enough:
             return m
-    return -1
+    return direct
 
 
 @jitable
@@ -309,15 +315,7 @@ def partners_of(mesh_i: F1, mesh_j: F1, count: int, values: F2, pairs: F2) -> I2
         table[place_in(table, pairs, int(pairs[k, 0]), int(pairs[k, 1]))] = k
     partners = np.full((count, EDGES), -1)
     for k in range(count):
-        a, b = int(pairs[k, 0]), int(pairs[k, 1])
-        beside_i = int(mesh_i[AT_TRIANGLES]) + TRIANGLE * a + BESIDE
-        beside_j = int(mesh_j[AT_TRIANGLES]) + TRIANGLE * b + BESIDE
-        for e in range(3):
-            if values[k, e] > 0.0:
-                partners[k, e] = table[place_in(table, pairs, int(mesh_i[beside_i + e]), b)]
-            if values[k, 3 + e] > 0.0:
-                partners[k, 3 + e] = table[place_in(table, pairs, a, int(mesh_j[beside_j + e]))]
         for e in range(EDGES):
-            if values[k, e] > 0.0 and partners[k, e] < 0:
-                partners[k, e] = across_both(mesh_i, mesh_j, table, pairs, values, k, e)
+            if values[k, e] > 0.0:
+                partners[k, e] = beyond_edge(mesh_i, mesh_j, table, pairs, values, k, e)
     return partners
