@@ -7,7 +7,7 @@ import math
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1, F2, V2, V3
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import dot, sub, vector
+from mbsim.core.rotation import add, cross, dot, rotate, scale, sub, unrotate, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.forces import sides
 from mbsim.geometry.catalog import AT_NORMAL, AT_POINT
@@ -24,13 +24,13 @@ def trace(S: F2) -> float:
 
 
 @jitable
-def yielding(scene: Scene, y: F1, b: int, p: V3) -> float:
-    """Return an upper bound of the velocity that a unit tangential impulse at p gives body b."""
+def answer(scene: Scene, y: F1, b: int, p: V3, d: V3) -> float:
+    """Return the velocity along d that a unit impulse along d at p gives body b there."""
     bodies = scene.bodies
     if b == len(bodies.mass):
         return 0.0
-    arm = sub(p, position(scene, y, b))
-    return 1.0 / bodies.mass[b] + dot(arm, arm) * trace(bodies.inverse[b])
+    turning = unrotate(scene.work.R[b], cross(sub(p, position(scene, y, b)), d))
+    return 1.0 / bodies.mass[b] + dot(turning, rotate(bodies.inverse[b], turning))
 
 
 @jitable
@@ -39,19 +39,24 @@ def hold_back(scene: Scene, y: F1, s: int, h: float, slip: V2) -> None:
 
     Friction that turns sign from step to step would shake what rests; a quarter, since some
     eight contacts share a body. Explicit methods of fixed step need this, as their step does not
-    follow the slope of friction; it fades as the step goes to 0.
+    follow the slope of friction at coarse tolerances; it fades as the step goes to 0, and from a
+    tolerance of 1e-5 on the step follows (`events.contact_stability`).
     """
     out, p, body = scene.work.law_out, vector(scene.work.points[s, AT_POINT:]), scene.graphics.body
     gi, gj = sides(scene, s)
-    force = math.hypot(out[FORCE_X_OUT], out[FORCE_Y_OUT])
-    inverse = yielding(scene, y, body[gi], p) + yielding(scene, y, body[gj], p)
-    most = HELD_BACK * math.hypot(slip[0], slip[1]) / (h * inverse)
+    force, speed = math.hypot(out[FORCE_X_OUT], out[FORCE_Y_OUT]), math.hypot(slip[0], slip[1])
+    n, tx = vector(scene.work.points[s, AT_NORMAL:]), vector(scene.work.t[s])
+    most = 0.0
+    if speed > 0.0:
+        d = add(scale(slip[0] / speed, tx), scale(slip[1] / speed, cross(n, tx)))
+        inverse = answer(scene, y, body[gi], p, d) + answer(scene, y, body[gj], p, d)
+        most = HELD_BACK * speed / (h * inverse)
     if force > most:
         for k in range(2):
             out[FORCE_X_OUT + k] *= most / force
     if out[TORQUE_Z_OUT] != 0.0:
         # so of the torque against spin, to the spin that it would stop
-        n, inverse = vector(scene.work.points[s, AT_NORMAL:]), 0.0
+        inverse = 0.0
         for b in (body[gi], body[gj]):
             if b < len(scene.bodies.mass):
                 inverse += trace(scene.bodies.inverse[b])

@@ -24,7 +24,13 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import dot, rotate, sub, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.detection import find_contacts
-from mbsim.dynamics.contact.forces import contact_of, face_weight_of, sides, stands_for_points
+from mbsim.dynamics.contact.forces import (
+    SLIP,
+    contact_of,
+    face_weight_of,
+    sides,
+    stands_for_points,
+)
 from mbsim.dynamics.contact.points import deepest_of_impact
 from mbsim.dynamics.events.stability import add_to_block, translation, yielding
 from mbsim.dynamics.events.step_limits import longest_travel
@@ -36,11 +42,20 @@ from mbsim.geometry.catalog import (
     MOMENT_XX,
     MOMENT_YY,
     REGION_ROWS,
+    plane_axes,
 )
-from mbsim.laws.abi import ELASTIC, ENERGY, LOAD
+from mbsim.laws.abi import ELASTIC, ENERGY, FORCE_X_OUT, LOAD, NFORCE_IN, XDOT_IN
 
 #: Part of a contact's stored energy that motion and push may add and it still counts as at rest.
 AT_REST = 0.1
+#: Part of friction's rate of damping that steps follow, so that at tolerances from 1e-5 on
+#: `contact.fixed_step` holds none back.
+FOLLOWED = 0.2
+#: Part of the slip that is left at least in `STABLE_EVERY` steps, each of which takes up to a quarter
+#: of it: 1/(1 + 16/4).
+LEFT = 0.2
+#: Least slip at which friction is asked, as a part of the scale of speeds.
+SLOW = 1e-6
 #: Substitutions that find the depth of an impact under a force to a few per cent.
 SUBSTITUTIONS = 6
 
@@ -118,6 +133,38 @@ def add_points(scene: Scene, y: F1, s: int, b: int, k: float, damping: float) ->
 
 
 @jitable
+def add_friction_damping(scene: Scene, y: F1, s: int, normal: float, out: F1) -> None:
+    """Add what friction of slot s damps to the blocks of its bodies, where its law is built in.
+
+    The slope is that from rest to the slip that is left until steps are found anew; `normal` is the
+    force that will press.
+    """
+    contacts, work, given = scene.contacts, scene.work, scene.work.law_in
+    c = contact_of(scene, s)
+    if contacts.friction_law[c] == 0 or contacts.framed[c] == 1 or contacts.interpreted[c] == 1:
+        return
+    speed = max(LEFT * work.slot[s, SLIP], SLOW * scene.world.scale[SCALE_SPEED])
+    for k in range(len(given)):
+        given[k] = 0.0
+    given[XDOT_IN], given[NFORCE_IN] = speed, normal
+    call = (contacts.id[c], given, contacts.friction_par[c], out)
+    if call_int(contacts.friction_law[c], call) != 0:
+        return
+    rate = FOLLOWED * abs(out[FORCE_X_OUT]) / speed
+    p, n = vector(work.points[s, AT_POINT:]), vector(work.points[s, AT_NORMAL:])
+    u, v = plane_axes(n)
+    gi, gj = sides(scene, s)
+    bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
+    ground = len(scene.bodies.mass)
+    rate *= 2.0 if bi < ground and bj < ground else 1.0
+    for b in (bi, bj):
+        if b < ground:
+            arm, block = sub(p, position(scene, y, b)), work.block[b]
+            add_to_block(block, u, 0.0, rate, yielding(scene, b, arm, u))
+            add_to_block(block, v, 0.0, rate, yielding(scene, b, arm, v))
+
+
+@jitable
 def add_touching(scene: Scene, y: F1, s: int, out: F1) -> None:
     """Add stiffness and damping of slot s to the blocks of its bodies."""
     work, bodies, state = scene.work, scene.bodies, scene.state
@@ -153,6 +200,8 @@ def add_touching(scene: Scene, y: F1, s: int, out: F1) -> None:
             inverse = bodies.inverse[b]
             turn += moments / weight * (inverse[0, 0] + inverse[1, 1] + inverse[2, 2])
         add_to_block(work.block[b], n, both * k, both * damping, turn)
+    call_int(scene.contacts.normal_law[c], (depth, 0.0, scene.contacts.normal_par[c], out))
+    add_friction_damping(scene, y, s, weight * out[ELASTIC], out)
 
 
 @jitable
