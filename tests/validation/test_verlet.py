@@ -6,11 +6,13 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import mbsim
 from helpers.decks import COULOMB, GRAVITY, GROUND, contact, run_deck, sphere, write_deck
 from helpers.folders import MODELS
 from helpers.pile_decks import balls, block, sets, shape_graphic, solid
+from helpers.slopes import slope
 from mbsim.errors import ModelError
 from mbsim.laws.catalog import FRICTION_LAWS
 
@@ -181,6 +183,34 @@ PIT = (
     + wall(13, 0.0, 0.0, [(0, 0, 1), (1, 0, 0), (0, 1, 0)])
     + wall(14, 0.0, 0.85, [(1, 0, 0), (0, 0, 1), (0, -1, 0)])
 )
+
+
+@pytest.mark.parametrize("spin", [20.0, 0.6])
+def test_friction_of_an_impact_is_followed(tmp_path, spin):
+    """A ball that spins is thrown on a plane: it slides throughout, or rolls before it leaves."""
+    law = {"stiffness": 1e6, "exponent": 1.0, "damping": 50, "dmax": 1e-4}
+    thrown = sphere(0.1001, v=(0.0, 0.0, -2.0), w=(0.0, spin, 0.0))
+    deck = GROUND + thrown + contact(**law, **COULOMB) + GRAVITY
+
+    def leaves(method, tol):
+        run = run_deck(tmp_path, deck, 0.01, integrator=method, tol=tol)
+        turning = 0.1 * run["bodies/2/angular_velocity"][-1]
+        return np.concatenate([run["bodies/2/velocity"][-1], turning])
+
+    exact = leaves("DOP853", 1e-11)
+    for tol, most in ((1e-5, 7e-3), (1e-6, 4e-4), (1e-7, 5e-5)):
+        assert np.abs(leaves("VERLET", tol) - exact).max() < most
+
+
+def test_a_patch_creeps_as_its_law_says(tmp_path):
+    """A cube mesh on a slope, on all of its side: mu(v) N is the pull of gravity along it."""
+    deck = slope("FIELD", "COULOMB_ON")
+    run = run_deck(tmp_path, deck, 0.3, 0.02, integrator="VERLET", tol=1e-4)
+    t, x = run["time"], run["bodies/2/position"][:, 0]
+    # STEP(v, -vs, -mu, vs, mu) = tan(10 degrees)
+    u = brentq(lambda u: 0.3 * (1.5 * u - 0.5 * u**3) - np.tan(np.deg2rad(10.0)), 0.0, 1.0)
+    late = t > 0.1
+    assert np.ptp(x[late]) / np.ptp(t[late]) == pytest.approx(0.01 * u, rel=2e-3)
 
 
 @pytest.mark.parametrize("tol", [1e-3, 1e-5])

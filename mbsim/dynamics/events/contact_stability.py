@@ -51,11 +51,11 @@ AT_REST = 0.1
 #: Part of friction's rate of damping that steps follow, so that at tolerances from 1e-5 on
 #: `contact.fixed_step` holds none back.
 FOLLOWED = 0.2
-#: Part of the slip that is left at least in `STABLE_EVERY` steps, each of which takes up to a quarter
-#: of it: 1/(1 + 16/4).
+#: Part of the slip that is left at least in `STABLE_EVERY` steps, each of which takes up to a
+#: quarter of what is left: 1/(1 + 16/4).
 LEFT = 0.2
-#: Least slip at which friction is asked, as a part of the scale of speeds.
-SLOW = 1e-6
+#: Slip below which friction is not followed, as a part of the scale of speeds.
+SLOW = 1e-5
 #: Substitutions that find the depth of an impact under a force to a few per cent.
 SUBSTITUTIONS = 6
 
@@ -143,14 +143,15 @@ def add_friction_damping(scene: Scene, y: F1, s: int, normal: float, out: F1) ->
     c = contact_of(scene, s)
     if contacts.friction_law[c] == 0 or contacts.framed[c] == 1 or contacts.interpreted[c] == 1:
         return
-    speed = max(LEFT * work.slot[s, SLIP], SLOW * scene.world.scale[SCALE_SPEED])
+    speed = LEFT * work.slot[s, SLIP]
     for k in range(len(given)):
         given[k] = 0.0
     given[XDOT_IN], given[NFORCE_IN] = speed, normal
     call = (contacts.id[c], given, contacts.friction_par[c], out)
     if call_int(contacts.friction_law[c], call) != 0:
         return
-    rate = FOLLOWED * abs(out[FORCE_X_OUT]) / speed
+    # what rolls has next to no friction, and what is held back of that counts for nothing
+    rate = FOLLOWED * abs(out[FORCE_X_OUT]) / max(speed, SLOW * scene.world.scale[SCALE_SPEED])
     p, n = vector(work.points[s, AT_POINT:]), vector(work.points[s, AT_NORMAL:])
     u, v = plane_axes(n)
     gi, gj = sides(scene, s)
