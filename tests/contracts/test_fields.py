@@ -10,8 +10,10 @@ import trimesh
 
 from helpers.fields import Shape, box_planes, potential, sliced, slopes, wrench
 from helpers.pairs import frame, random_rotation, turned
+from helpers.surfaces import Meshed, sphere
 from mbsim.compile_model.contacts import pair_address
 from mbsim.geometry.catalog import PAIRS, POINT
+from mbsim.model.smooth_facets import smooth
 
 
 def box():
@@ -76,18 +78,23 @@ def test_of_two_meshes_force_and_torque_are_slopes_of_the_potential(made):
     i, j, rng = box(), made(), np.random.default_rng(7)
     spots = [(1.0, 0.9, 1.2), (0.5, 2.0, 1.2), (1.2, 1.2, 0.5), (2.9, 0.5, 1.1)]
     spots = spots if made is l_shape else [(0.1, 0.2, 0.5), (0.5, 0.4, 0.4)]
-    met = 0
+    met = exact = 0
     for spot in spots:
         R = turned(rng.normal(size=3), 0.3 * rng.normal())
         p = np.array(spot) + 0.02 * rng.normal(size=3)
-        points = rows("FIELD-FIELD", frame(p, R), i.size, frame(np.zeros(3), np.eye(3)), j.size)
-        force, torque, _ = wrench(points, p)
+        still = frame(np.zeros(3), np.eye(3))
+        known, points = asked("FIELD-FIELD", frame(p, R), i.size, still, j.size)
+        force, torque, stored = wrench(points, p)
+        if known:
+            exact += 1
+            assert stored == pytest.approx(potential(i, j, p, R), rel=1e-9)
         found = slopes(lambda p, R: potential(i, j, p, R), p, R, turned, 1e-4)
         scale = np.linalg.norm(found[0])
         met += scale > 0.0
         np.testing.assert_allclose(force, found[0], atol=1e-6 * scale)
         np.testing.assert_allclose(torque, found[1], atol=1e-6 * scale)
     assert met == len(spots)
+    assert exact > 0
 
 
 def test_an_overlap_that_reaches_below_the_layer_is_told():
@@ -121,3 +128,18 @@ def test_the_force_is_of_second_order_in_the_edges_of_a_sphere():
     orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
     np.testing.assert_allclose(orders, 2.0, atol=0.2)
     assert abs(errors[1]) < 0.04
+
+
+@pytest.mark.parametrize(("level", "smoothed", "most"), [(6, False, 3e-3), (4, True, 2e-3)])
+def test_the_force_of_a_fine_or_a_smooth_sphere_is_that_of_the_true_one(level, smoothed, most):
+    """81,920 flat triangles, or 5120 that are rounded: a sphere of radius 1, 0.05 deep."""
+    vertices, faces = sphere(1.0, level)
+    if smoothed:
+        vertices, faces = smooth(vertices, faces)
+    mesh, d, rng = Meshed(vertices, faces, layered=False), 0.05, np.random.default_rng(2)
+    exact = np.pi * d**2 * (1.0 - d / 3.0)
+    plane = frame(np.zeros(3), np.eye(3))
+    for _ in range(8):
+        pose = frame(np.array([0.0, 0.0, 1.0 - d]), random_rotation(rng))
+        force, _, _ = wrench(rows("FIELD-PLANE", pose, mesh.size, plane, np.zeros(4)), np.zeros(3))
+        assert force[2] == pytest.approx(exact, rel=most)

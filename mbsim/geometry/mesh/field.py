@@ -40,6 +40,7 @@ from mbsim.geometry.mesh.merging import (
 )
 from mbsim.geometry.mesh.record import (
     AREA_VECTOR,
+    BEYOND,
     MOMENT,
     PEAK,
     POTENTIAL,
@@ -115,6 +116,9 @@ def write_patch(patch: F1, frame: F1, origin: V3, points: F2) -> None:
     push, size = vector(patch, PUSH), norm(vector(patch, PUSH))
     c = centre_of(patch)
     depth = max(2.0 * patch[POTENTIAL] / size, LEAST_DEPTH * patch[PEAK])
+    if patch[BEYOND] > 0.0:
+        # the potential of what is below the layer is not known
+        depth = patch[PEAK]
     depth = min(depth, patch[PEAK])
     local = scale(1.0 / size, push)
     n = to_global(frame, local)

@@ -8,12 +8,14 @@ import numpy as np
 
 from mbsim.core.arrays import F1, F2, I1, I2, V3
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import cross, dot, scale, sub, vector
+from mbsim.core.rotation import cross, dot, sub, vector
 from mbsim.geometry.mesh.polygon import CORNER as POLYGON_CORNER
 from mbsim.geometry.mesh.polygon import CORNERS, begin, cut, integrate
 from mbsim.geometry.mesh.record import (
     MOMENT,
+    OF_SQUARE,
     PATCH_NUMBERS,
+    POTENTIAL,
     PRESSURE,
     PUSH,
     SPREAD,
@@ -114,7 +116,9 @@ def measure_below(
         sums[k] = 0.0
     integrate(polygon, count, depth, sums)
     e1, e2 = sub(b, a), sub(c, a)
-    add_piece(node, sums, sub(a, origin), e1, e2, scale(-1.0, n), 1.0, 1.0)
+    add_piece(node, sums, sub(a, origin), e1, e2, 1.0, 1.0)
+    # psi has the slope -n: its integral is the flux of -n psi^2/2
+    node[POTENTIAL] -= 0.5 * sums[OF_SQUARE] * dot(cross(e1, e2), n)
     # along the plane's normal alone the centre of pressure is that of the overlap, to the last bit
     pressure = dot(vector(node, PUSH), n)
     part = pressure / node[PRESSURE] if node[PRESSURE] > 0.0 else 0.0

@@ -14,7 +14,7 @@ from mbsim.core.arrays import F1, F2, V3, V4
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.geometry.mesh.polygon import CORNERS, begin, cut, integrate
-from mbsim.geometry.mesh.record import BEYOND, MOST, SUMS, add_piece
+from mbsim.geometry.mesh.record import BEYOND, MOST, OF_PSI, POTENTIAL, SUMS, add_piece
 from mbsim.model.surface import DEPTH, INNER, ORDER
 
 #: What makes an edge of a polygon besides the triangle's own edges 0, 1, 2: the sides of the prism
@@ -36,13 +36,13 @@ def side_between(i: int, j: int) -> int:
 
 
 @jitable
-def heights_over(x: V3, y: V3, z: V3, tri: tuple[V3, V3, V3]) -> tuple[V3, V3]:
-    """Return the normal of a face (its length is twice the area) and a triangle's heights over it.
+def heights_over(x: V3, y: V3, z: V3, tri: tuple[V3, V3, V3]) -> V3:
+    """Return a triangle's heights over a face, times twice its area.
 
     Corners of a face are given in one order, so both tetrahedra beside it find the same numbers.
     """
     n = cross(sub(y, x), sub(z, x))
-    return n, (dot(n, sub(tri[0], x)), dot(n, sub(tri[1], x)), dot(n, sub(tri[2], x)))
+    return (dot(n, sub(tri[0], x)), dot(n, sub(tri[1], x)), dot(n, sub(tri[2], x)))
 
 
 @jitable
@@ -65,6 +65,54 @@ def cut_at(polygon: F2, count: int, h: V3, side: float, tag: int, made: F2) -> t
         return polygon, made, count
     f = (side * h[0], side * (h[1] - h[0]), side * (h[2] - h[0]))
     return made, polygon, cut(polygon, count, f, tag, made)
+
+
+@jitable
+def add_potential(
+    polygon: F2,
+    count: int,
+    psi: V3,
+    corners: tuple[V3, V3, V3, V3],
+    depths: V4,
+    tags: tuple[int, int, int, int],
+    tri: tuple[V3, V3, V3],
+    whole: float,
+    node: F1,
+) -> None:
+    """Add half the integral of psi over the overlap with a tetrahedron, as far as a polygon tells.
+
+    psi is 0 at the first corner a and linear, so div(psi (x - a)) = 4 psi: the integral is a
+    quarter of the flux through the polygon, and through the face opposite to a, which touches
+    the surface in its corner b. In its plane div(psi (x - b)) = 3 psi: what counts there are the
+    polygon's edges in it, and the part of its edge c c' inside of the other mesh, which ends where
+    two edges of the polygon meet. `whole` is the integral of psi over the polygon, over du dv.
+    """
+    a, b, c, last = corners
+    e1, e2 = sub(tri[1], tri[0]), sub(tri[2], tri[0])
+    n = cross(e1, e2)
+    flux = whole * dot(n, sub(tri[0], a))
+    if tags[0] != END:
+        d = depths[3]
+        on_surface = depths[2] == 0.0
+        volume = abs(dot(cross(sub(b, a), sub(c, a)), sub(last, a))) if on_surface else 0.0
+        way = 1.0 if dot(n, sub(last, c)) > 0.0 else -1.0
+        for k in range(count):
+            tag = int(polygon[k, 2])
+            j = k + 1 if k + 1 < count else 0
+            if tag == tags[0]:
+                u, v, x, y = polygon[k, 0], polygon[k, 1], polygon[j, 0], polygon[j, 1]
+                here = add(tri[0], add(scale(u, e1), scale(v, e2)))
+                after = add(tri[0], add(scale(x, e1), scale(y, e2)))
+                total = 2.0 * psi[0] + psi[1] * (u + x) + psi[2] * (v + y)
+                flux -= total / 6.0 * dot(sub(b, a), cross(sub(here, b), sub(after, b)))
+            beyond = int(polygon[j, 2])
+            if on_surface and (
+                (tag == tags[0] and beyond == tags[1]) or (tag == tags[1] and beyond == tags[0])
+            ):
+                # where c c' leaves the other mesh, or comes in
+                part = (psi[0] + psi[1] * polygon[j, 0] + psi[2] * polygon[j, 1]) / d
+                flux += way * part * part * d * volume / 6.0
+    node[POTENTIAL] += 0.125 * flux
 
 
 @jitable
@@ -91,16 +139,16 @@ def piece_in_tetrahedron(
         return
     # the corner opposite to a face is above it, or below, by the volume
     up = 1.0 if volume > 0.0 else -1.0
-    np_, hp = heights_over(q, r, s, tri)
+    hp = heights_over(q, r, s, tri)
     if outside(hp, -up, volume < 0.0 or tags[0] == END):
         return
-    nq, hq = heights_over(p, r, s, tri)
+    hq = heights_over(p, r, s, tri)
     if outside(hq, up, volume > 0.0):
         return
-    nr, hr = heights_over(p, q, s, tri)
+    hr = heights_over(p, q, s, tri)
     if outside(hr, -up, volume < 0.0):
         return
-    ns, hs = heights_over(p, q, r, tri)
+    hs = heights_over(p, q, r, tri)
     if outside(hs, up, volume > 0.0):
         return
     first, second = work[:CORNERS], work[CORNERS : 2 * CORNERS]
@@ -123,8 +171,8 @@ def piece_in_tetrahedron(
     for k in range(SUMS):
         sums[k] = 0.0
     integrate(first, count, psi, sums)
-    slope = add(add(scale(dp, np_), scale(dq, nq)), add(scale(dr, nr), scale(ds, ns)))
-    add_piece(node, sums, tri[0], sub(tri[1], tri[0]), sub(tri[2], tri[0]), slope, side, 0.5)
+    add_piece(node, sums, tri[0], sub(tri[1], tri[0]), sub(tri[2], tri[0]), side, 0.5)
+    add_potential(first, count, psi, corners, depths, tags, tri, sums[OF_PSI], node)
     note_edges(first, count, psi, values)
     for k in range(count):
         if int(first[k, 2]) == END:

@@ -16,9 +16,8 @@ from mbsim.core.rotation import add, cross, dot, norm, scale
 #: I, sum w (-integral of psi_J n_I dA + integral of psi_I n_J dA) (3) [L^3], and its torque on I
 #: about the origin (3) [L^4]; the area as a vector, sum w (-integral of n_I dA + integral of n_J
 #: dA) (3) [L^2]; the volume of the overlap [L^3]; the potential U [L^4], of which the force is the
-#: slope, as the sum of w/2 integral of psi^2 (n . g)/g^2 dA with g the slope of psi: exact where
-#: the other surface is flat below the patch; sum w integral of psi r r' dA (xx, yy, zz, xy, yz, zx)
-#: [L^5].
+#: slope: the sum of w integral of psi dV over the overlap (on a plane: `plane`, of two meshes:
+#: `prism`); sum w integral of psi r r' dA (xx, yy, zz, xy, yz, zx) [L^5].
 PATCH_NUMBERS = 23
 PEAK, PRESSURE, MOMENT, PUSH, TWIST, AREA_VECTOR, VOLUME, POTENTIAL = 0, 1, 2, 5, 8, 11, 14, 15
 SPREAD = 16
@@ -32,14 +31,12 @@ OF_ONE, OF_PSI, OF_PSI_U, OF_PSI_V, OF_SQUARE, OF_UU, OF_UV, OF_VV, MOST = range
 
 
 @jitable
-def add_piece(
-    patch: F1, sums: F1, r: V3, e1: V3, e2: V3, slope: V3, side: float, share: float
-) -> None:
+def add_piece(patch: F1, sums: F1, r: V3, e1: V3, e2: V3, side: float, share: float) -> None:
     """Add a polygon of a triangle to a patch.
 
-    `r` is the triangle's first corner from the origin, `e1`, `e2` are its edges from there, `slope`
-    that of psi; `side` 1 for a triangle of I, -1 of J; `share` its w. The volume comes
-    from the divergence of r / 3, so the sum over pieces of I and J is whole, whatever w is.
+    `r` is the triangle's first corner from the origin, `e1`, `e2` are its edges from there; `side`
+    is 1 for a triangle of I, -1 of J; `share` its w. The volume comes from the divergence of r / 3,
+    so the sum over pieces of I and J is whole, whatever w is. The potential is added elsewhere.
     """
     n = cross(e1, e2)
     first = add(scale(sums[OF_PSI], r), add(scale(sums[OF_PSI_U], e1), scale(sums[OF_PSI_V], e2)))
@@ -62,9 +59,6 @@ def add_piece(
             + sums[OF_UV] * (e1[i] * e2[j] + e2[i] * e1[j])
         )  # fmt: skip
     patch[VOLUME] += dot(r, n) * sums[OF_ONE] / 3.0
-    square = dot(slope, slope)
-    if square > 0.0:
-        patch[POTENTIAL] += 0.5 * share * sums[OF_SQUARE] * dot(n, slope) / square
 
 
 @jitable
