@@ -88,6 +88,22 @@ def test_ten_bounces_of_a_mesh_on_a_mesh_keep_the_energy(tol, most, tmp_path):
     apart = results["contacts/301/incidents"][:] == 0
     assert ((v[:-1, 2] < 0.0) & (v[1:, 2] > 0.0)).sum() >= 10
     assert np.abs(energy[apart] / energy[0] - 1.0).max() < most
+    # on corners and edges what is stored counts in the balance
+    assert not results.audit.warnings
+
+
+def test_a_box_that_rolls_off_a_slab_is_not_warned_of(tmp_path):
+    """It touches the slab's edge with its side, and the slab's top with its edge."""
+    slab = trimesh.creation.box((1.0, 1.0, 1.0))
+    slab.apply_translation((0.0, 0.0, -0.5))
+    small = trimesh.creation.box((0.4, 0.3, 0.2))
+    model = GROUND.replace('<Post_Graphic id="100" type="Plane" rm_id="10"/>', mesh(100, 10, slab))
+    start = 'v_ic_x="0.3" v_ic_x_flag="TRUE"'
+    place = 'phi="0.3" theta="0.5" pos_x="0.45"'
+    model += body(0.3, 0.01, start, place) + mesh(200, 20, small)
+    results = run_deck(tmp_path, model + contact(FIELD.format(1e7, 0)) + GRAVITY, 0.6)
+    assert results["contacts/301/peak_penetration"] > 1e-3
+    assert not results.audit.warnings
 
 
 def test_a_smooth_sphere_rolls_at_the_height_of_a_true_one(tmp_path):
