@@ -285,7 +285,7 @@ WRENCH_FORCE, WRENCH_TORQUE = 0, 3
 # columns of `Work.block`: stiffness 3 x 3 from 0 and its turning part, then damping
 TURNING_STIFFNESS, BLOCK_DAMPING, TURNING_DAMPING = 9, 10, 19
 # entries of `Work.bound`: the square of the highest frequency, the highest rate of damping
-HIGHEST_SQUARE, HIGHEST_DAMPING = range(2)
+HIGHEST_SQUARE, HIGHEST_DAMPING, HIGHEST_FRICTION = range(3)
 
 # entries of `Rows.used`
 USED_ROWS, USED_INCIDENTS, USED_EVENTS = range(3)

@@ -34,7 +34,7 @@ class Work(NamedTuple):
     fcl: I1  # (np,) pairs that FCL shall do
     net: F2  # (nc, 3) force of each contact
     block: F2  # (nb, 20) stiffness that acts on a body (3 x 3) and its turning part, damping
-    bound: F1  # (2,) squared frequency and rate of damping, the largest so far
+    bound: F1  # (3,) squared frequency, rates of damping and of friction, the largest so far
     best: F1  # (4,) pair that gave it: contact, energy at touch, force behind it, inverse mass
     idle: F1  # (ny,) y' at points that are only looked at; (0,) where none is
     ahead: F2  # (2, ny) y and y' a little later; (0, 0) where no rates of forces are looked for

@@ -142,7 +142,7 @@ def scratch(n: Sizes, graphics: Graphics) -> Work:
         fcl=np.zeros(max(1, n.pairs), dtype=np.int64),
         net=np.zeros((n.contacts, 3)),
         block=np.zeros((nb, 20)),
-        bound=np.zeros(2),
+        bound=np.zeros(3),
         best=np.zeros(4),
         idle=np.zeros(n.looked),
         ahead=np.zeros((2 if n.ahead else 0, n.ahead)),

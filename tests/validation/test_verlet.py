@@ -205,7 +205,7 @@ def test_friction_of_an_impact_is_followed(tmp_path, spin):
 def test_a_patch_creeps_as_its_law_says(tmp_path):
     """A cube mesh on a slope, on all of its side: mu(v) N is the pull of gravity along it."""
     deck = slope("FIELD", "COULOMB_ON")
-    run = run_deck(tmp_path, deck, 0.3, 0.02, integrator="VERLET", tol=1e-4)
+    run = run_deck(tmp_path, deck, 0.3, 0.02, integrator="VERLET", tol=1e-5)
     t, x = run["time"], run["bodies/2/position"][:, 0]
     # STEP(v, -vs, -mu, vs, mu) = tan(10 degrees)
     u = brentq(lambda u: 0.3 * (1.5 * u - 0.5 * u**3) - np.tan(np.deg2rad(10.0)), 0.0, 1.0)

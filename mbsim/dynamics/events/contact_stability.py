@@ -13,6 +13,7 @@ from mbsim.arrays.codes import (
     CENTRE_ACCELERATION,
     FASTEST_POINT,
     HIGHEST_DAMPING,
+    HIGHEST_FRICTION,
     HIGHEST_SQUARE,
     SCALE_LENGTH,
     SCALE_SPEED,
@@ -48,9 +49,6 @@ from mbsim.laws.abi import ELASTIC, ENERGY, FORCE_X_OUT, LOAD, NFORCE_IN, XDOT_I
 
 #: Part of a contact's stored energy that motion and push may add and it still counts as at rest.
 AT_REST = 0.1
-#: Part of friction's rate of damping that steps follow, so that at tolerances from 1e-5 on
-#: `contact.fixed_step` holds none back.
-FOLLOWED = 0.2
 #: Part of the slip that is left at least in `STABLE_EVERY` steps, each of which takes up to a
 #: quarter of what is left: 1/(1 + 16/4).
 LEFT = 0.2
@@ -133,8 +131,8 @@ def add_points(scene: Scene, y: F1, s: int, b: int, k: float, damping: float) ->
 
 
 @jitable
-def add_friction_damping(scene: Scene, y: F1, s: int, normal: float, out: F1) -> None:
-    """Add what friction of slot s damps to the blocks of its bodies, where its law is built in.
+def note_friction(scene: Scene, y: F1, s: int, normal: float, out: F1) -> None:
+    """Raise the rate of friction to that of slot s [1/T], where its law is built in.
 
     The slope is that from rest to the slip that is left until steps are found anew; `normal` is the
     force that will press.
@@ -151,18 +149,17 @@ def add_friction_damping(scene: Scene, y: F1, s: int, normal: float, out: F1) ->
     if call_int(contacts.friction_law[c], call) != 0:
         return
     # what rolls has next to no friction, and what is held back of that counts for nothing
-    rate = FOLLOWED * abs(out[FORCE_X_OUT]) / max(speed, SLOW * scene.world.scale[SCALE_SPEED])
+    slope = abs(out[FORCE_X_OUT]) / max(speed, SLOW * scene.world.scale[SCALE_SPEED])
     p, n = vector(work.points[s, AT_POINT:]), vector(work.points[s, AT_NORMAL:])
     u, v = plane_axes(n)
     gi, gj = sides(scene, s)
-    bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
-    ground = len(scene.bodies.mass)
-    rate *= 2.0 if bi < ground and bj < ground else 1.0
-    for b in (bi, bj):
-        if b < ground:
-            arm, block = sub(p, position(scene, y, b)), work.block[b]
-            add_to_block(block, u, 0.0, rate, yielding(scene, b, arm, u))
-            add_to_block(block, v, 0.0, rate, yielding(scene, b, arm, v))
+    answer = 0.0
+    for b in (scene.graphics.body[gi], scene.graphics.body[gj]):
+        if b < len(scene.bodies.mass):
+            arm = sub(p, position(scene, y, b))
+            answer += max(yielding(scene, b, arm, u), yielding(scene, b, arm, v))
+            answer += translation(scene, b)
+    work.bound[HIGHEST_FRICTION] = max(work.bound[HIGHEST_FRICTION], slope * answer)
 
 
 @jitable
@@ -202,7 +199,7 @@ def add_touching(scene: Scene, y: F1, s: int, out: F1) -> None:
             turn += moments / weight * (inverse[0, 0] + inverse[1, 1] + inverse[2, 2])
         add_to_block(work.block[b], n, both * k, both * damping, turn)
     call_int(scene.contacts.normal_law[c], (depth, 0.0, scene.contacts.normal_par[c], out))
-    add_friction_damping(scene, y, s, weight * out[ELASTIC], out)
+    note_friction(scene, y, s, weight * out[ELASTIC], out)
 
 
 @jitable

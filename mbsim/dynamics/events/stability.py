@@ -27,6 +27,7 @@ from mbsim.arrays.codes import (
     BOUND_TURNING,
     BOUND_TURNING_DAMPING,
     HIGHEST_DAMPING,
+    HIGHEST_FRICTION,
     HIGHEST_SQUARE,
     REST,
     TURNING_DAMPING,
@@ -44,6 +45,10 @@ from mbsim.dynamics.bodies.markers import marker_arm, marker_axis, marker_point
 
 #: Tolerance at which the step is half of the stability bound of an undamped vibration.
 COARSE = 1e-3
+#: Part of the friction that would stop a slip in one step, which a fixed-step method may use.
+HELD_BACK = 0.25
+#: Tolerance from which on steps follow friction.
+FOLLOWED = 1e-5
 #: Largest step over half of the bound; the bound is below the true limit.
 LARGEST_PART = 1.8
 
@@ -188,6 +193,7 @@ def stable_step(scene: Scene, tol: float, y: F1, f: F1) -> float:
         for k in range(20):
             work.block[b, k] = 0.0
     hook = scene.world.hooks[Hook.STABILITY]
+    work.bound[HIGHEST_FRICTION] = 0.0
     if hook != 0:
         travel = call_float(hook, (scene, Stability.TOUCHING, y, f))
         if travel < 0.0:
@@ -212,8 +218,11 @@ def stable_step(scene: Scene, tol: float, y: F1, f: F1) -> float:
         call_float(hook, (scene, Stability.MEETING, y, f))
 
     # the limit of the method is (h w)^2 / 4 + h c = 1 (w frequency, c rate of damping), so h =
-    # 2 / (c + sqrt(c^2 + w^2)); order 2 needs the root of the tolerance. Friction is held back
-    # instead (`contact.fixed_step`)
+    # 2 / (c + sqrt(c^2 + w^2)); order 2 needs the root of the tolerance
+    if bound[HIGHEST_FRICTION] > 0.0:
+        # friction is held back (`contact.fixed_step`) of coarser tolerances: it is costly to follow
+        more = max(math.sqrt(tol / FOLLOWED), tol / FOLLOWED)
+        longest = min(longest, HELD_BACK * more / bound[HIGHEST_FRICTION])
     part = min(LARGEST_PART, math.sqrt(tol / COARSE))
     fastest = bound[HIGHEST_DAMPING] + math.sqrt(
         bound[HIGHEST_DAMPING] * bound[HIGHEST_DAMPING] + bound[HIGHEST_SQUARE]
