@@ -22,15 +22,15 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1, V2
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import dot, rotate, sub, vector
+from mbsim.core.rotation import dot, norm, rotate, scale, sub, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.detection import find_contacts
 from mbsim.dynamics.contact.forces import (
-    SLIP,
     contact_of,
     face_weight_of,
     sides,
     stands_for_points,
+    velocity_at,
 )
 from mbsim.dynamics.contact.points import deepest_of_impact
 from mbsim.dynamics.events.stability import add_to_block, translation, yielding
@@ -141,7 +141,12 @@ def note_friction(scene: Scene, y: F1, s: int, normal: float, out: F1) -> None:
     c = contact_of(scene, s)
     if contacts.friction_law[c] == 0 or contacts.framed[c] == 1 or contacts.interpreted[c] == 1:
         return
-    speed = LEFT * work.slot[s, SLIP]
+    p, n = vector(work.points[s, AT_POINT:]), vector(work.points[s, AT_NORMAL:])
+    gi, gj = sides(scene, s)
+    bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
+    # not that of the slot: what was evaluated last may be another point
+    slip = sub(velocity_at(scene, y, bi, p), velocity_at(scene, y, bj, p))
+    speed = LEFT * norm(sub(slip, scale(dot(slip, n), n)))
     for k in range(len(given)):
         given[k] = 0.0
     given[XDOT_IN], given[NFORCE_IN] = speed, normal
@@ -150,11 +155,9 @@ def note_friction(scene: Scene, y: F1, s: int, normal: float, out: F1) -> None:
         return
     # what rolls has next to no friction, and what is held back of that counts for nothing
     slope = abs(out[FORCE_X_OUT]) / max(speed, SLOW * scene.world.scale[SCALE_SPEED])
-    p, n = vector(work.points[s, AT_POINT:]), vector(work.points[s, AT_NORMAL:])
     u, v = plane_axes(n)
-    gi, gj = sides(scene, s)
     answer = 0.0
-    for b in (scene.graphics.body[gi], scene.graphics.body[gj]):
+    for b in (bi, bj):
         if b < len(scene.bodies.mass):
             arm = sub(p, position(scene, y, b))
             answer += max(yielding(scene, b, arm, u), yielding(scene, b, arm, v))
