@@ -79,8 +79,8 @@ def drawn(curves: Sequence[Curve], y_axis: str, x_axis: str) -> str:
         f"{escape(y_axis)}</text>"
     )
     for k, curve in enumerate(curves):
-        for t, value, error in _bars(curve):
-            above, below = (np.clip(value + side * error, low, high) for side in (1.0, -1.0))
+        for t, middle, error in _bars(curve):
+            above, below = (np.clip(middle + side * error, low, high) for side in (1.0, -1.0))
             points = np.column_stack([at_x(np.r_[t, t[::-1]]), at_y(np.r_[above, below[::-1]])])
             text = " ".join(f"{a:.1f},{b:.1f}" for a, b in points)
             parts.append(f'<polygon class="band b{k % COLOURS}" points="{text}"/>')
