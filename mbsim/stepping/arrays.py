@@ -116,12 +116,13 @@ class Points(NamedTuple):
     normal: F2  # (m, 3)
     tangent: F2  # (m, 3)
     H: F4  # (m, 2, 3, 6) velocity along (n, x, y) by those of the bodies
-    answer: F4  # (m, 2, 6, 3) velocities of the bodies by r, where joints hold neither
+    answer: F4  # (m, 2, 3, 6) velocities of the bodies by each of r, where joints hold neither
     wide: I1  # (m,) else first row of `moved`, -1 where they do not
     many: I1  # (m,) its rows there
     moved: I1  # (wide rows,) bodies that r moves
     moves: F3  # (wide rows, 6, 3) their velocities by r
     W: F3  # (m, 3, 3) u by r
+    stops: F3  # (m, 3, 3) its inverse, 0 where it has none
     mu: F1  # (m,)
     holds: F1  # (m,) mu as it is at the step's begin
     ahead: F1  # (m,) u_n + ahead >= 0 where the point closes
@@ -207,12 +208,13 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int]) -
         normal=numbers(m, 3),
         tangent=numbers(m, 3),
         H=numbers(m, 2, 3, 6),
-        answer=numbers(m, 2, 6, 3),
+        answer=numbers(m, 2, 3, 6),
         wide=whole(m),
         many=whole(m),
         moved=whole(wide),
         moves=numbers(wide, 6, 3),
         W=numbers(m, 3, 3),
+        stops=numbers(m, 3, 3),
         mu=numbers(m),
         holds=numbers(m),
         ahead=numbers(m),

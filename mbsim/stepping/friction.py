@@ -58,14 +58,18 @@ def let_yield(S: Stepping, count: int, allowed: float) -> bool:
         end = begin + 1
         while end < count and P.key[end] == P.key[begin]:
             end += 1
-        together = load_of(S, begin, end) >= 1.0 - YIELDS
+        load = -1.0
         for k in range(begin, end):
             if P.r[k, 0] == 0.0 or P.holds[k] < S.rules.number[P.contact[k], STICKING]:
                 continue
             i, j = P.body[k, 0], P.body[k, 1]
             x, z = velocity_of(P.H, k, 1, M.v, i, j), velocity_of(P.H, k, 2, M.v, i, j)
-            slip = math.hypot(x, z)
-            if slip <= (allowed if together else NOISE * allowed):
+            slip = math.sqrt(x * x + z * z)
+            if slip <= allowed:
+                continue
+            if load < 0.0:
+                load = load_of(S, begin, end)
+            if load < 1.0 - YIELDS and slip <= NOISE * allowed:
                 continue
             mu = coefficient(S, P.contact[k], slip)
             if mu < (1.0 - YIELDS) * P.mu[k]:

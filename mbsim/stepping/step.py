@@ -43,6 +43,7 @@ from mbsim.stepping.arrays import (
     ALL_POINTS,
     ALL_STEPS,
     ALL_SWEEPS,
+    FIXED,
     KEPT_STICKS,
     LEFT,
     NEWTONS,
@@ -211,6 +212,9 @@ def look_ahead(S: Stepping, k: int, h: float) -> float:
     """
     P, M, rule = S.points, S.motion, S.rules.number[S.points.contact[k]]
     gap, before = P.gap[k], P.closing[k]
+    if P.was[k] >= 0 and 0.0 < gap <= S.plan.number[SLOP]:
+        # it lies on: to follow what does not count would keep all that rests in motion
+        gap = 0.0
     free = velocity_of(P.H, k, 0, M.free, P.body[k, 0], P.body[k, 1])
     mean = 0.5 * (before + free)
     P.ahead[k] = max(gap, 0.0) / h
@@ -243,7 +247,7 @@ def prepare_points(scene: Scene, S: Stepping, h: float) -> int:
     for k in range(count):
         i, j = P.body[k, 0], P.body[k, 1]
         x, z = velocity_of(P.H, k, 1, M.before, i, j), velocity_of(P.H, k, 2, M.before, i, j)
-        slip, row = math.hypot(x, z), P.was[k]
+        slip, row = math.sqrt(x * x + z * z), P.was[k]
         if row >= 0 and slip <= NOISE * S.plan.number[LEFT] / h:
             # what stuck moves by what the solver left of it
             slip = 0.0 if S.kept.table[row, KEPT_STICKS] == 1.0 else slip
@@ -366,7 +370,8 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
             return Code.NOT_FINITE
         if not let_yield(S, count, allowed):
             break
-    keep_loads(S, count, committed)
+    if S.plan.number[FIXED] == 0.0:
+        keep_loads(S, count, committed)
     spread_parts(S, count, h, slop, nb)
     for b in range(nb):
         for c in range(6):
