@@ -77,14 +77,7 @@ def contact_3d(
     if size == 0.0:
         return height, 0.0, 0.0
     low, high = 0.0, -1.0
-    # where the impulse given slips, s is the speed of that over its friction
-    rubs = r1 * r1 + r2 * r2
-    if rubs > 0.0:
-        u1 = b1 + v1 * rn + a[k, 1, 1] * r1 + a[k, 1, 2] * r2
-        u2 = b2 + v2 * rn + a[k, 2, 1] * r1 + a[k, 2, 2] * r2
-        s = math.sqrt((u1 * u1 + u2 * u2) / rubs)
-    else:
-        s = size / (mu * height) - 0.5 * (s11 + s22)
+    s = size / (mu * height) - 0.5 * (s11 + s22)
     if s <= 0.0:
         s = 1e-3 * (abs(s11) + abs(s22)) + 1e-300
     x1, x2, n, length = 0.0, 0.0, height, 1.0

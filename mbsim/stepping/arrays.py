@@ -41,9 +41,10 @@ KEPT_POINT, KEPT_NORMAL, KEPT_TANGENT, KEPT_FORCE = 14, 17, 20, 23
 KEPT_COLUMNS = 26
 # entries of `Plan.number`: 1 where the error of steps is not estimated; lengths below which gaps
 # and changes of position do not count; what the solver may leave of a velocity, times h; 1 where
-# some kind of pair is not near; how fast positions are projected, see `solver.project_positions`
-FIXED, SLOP, LEFT, SOME_AHEAD, PUSH_SPEED = range(5)
-PLAN_NUMBERS = 5
+# some kind of pair is not near; how fast positions are projected, see `solver.project_positions`;
+# what may be left of a velocity at most, however short a step; and part of a step's jumps that may
+FIXED, SLOP, LEFT, SOME_AHEAD, PUSH_SPEED, LEFT_SPEED, LEFT_PART = range(7)
+PLAN_NUMBERS = 7
 # entries of `Tally.number`, of the last step tried: what the solver left, as a velocity; its
 # length; the contact that closed fastest in it, and by how much within its length; how far its end
 # is from that of two halves, and its middle from the state between them; when it ended, once it
@@ -130,6 +131,7 @@ class Points(NamedTuple):
     r: F2  # (m, 3)
     old: F2  # (m, 3) r before the sweep at hand
     way: F2  # (m, 3) of the sweeps so far
+    counts: F1  # (m,) 1 over what may be left of its velocity
     push: F1  # (m,) what projected positions
 
 
@@ -222,6 +224,7 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int]) -
         r=numbers(m, 3),
         old=numbers(m, 3),
         way=numbers(m, 3),
+        counts=numbers(m),
         push=numbers(m),
     )
     room = 1 << max(4, int(4 * m - 1).bit_length())

@@ -6,7 +6,7 @@ import math
 
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, norm, scale, vector
-from mbsim.stepping.arrays import FIRST_SPEED, SPEEDS, STICKING, Stepping
+from mbsim.stepping.arrays import FIRST_SPEED, LEFT, LEFT_SPEED, SPEEDS, STICKING, Stepping
 from mbsim.stepping.solver import velocity_of
 
 #: Closing speeds have no restitution, and slips are none, up to so many times what the solver may
@@ -14,6 +14,16 @@ from mbsim.stepping.solver import velocity_of
 NOISE = 30.0
 #: Changes of mu that do not count, and loads that are as large as they may be.
 YIELDS = 1e-3
+
+
+@jitable
+def left_of(S: Stepping, h: float) -> float:
+    """Return what the solver may leave of a velocity in a step h.
+
+    What it moves in the step does not count then; nor, over the model's own time, what is left of a
+    velocity behind an impact in a step that is very short.
+    """
+    return min(S.plan.number[LEFT] / h, S.plan.number[LEFT_SPEED])
 
 
 @jitable
