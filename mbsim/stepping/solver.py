@@ -28,6 +28,8 @@ from mbsim.stepping.arrays import Motion, Points
 FEW_SWEEPS, MOST_SWEEPS = 40, 400
 #: Sweeps between looks at how much the bodies' velocities change in the step.
 LOOKS = 8
+#: What impacts may leave at most, over what the solver may leave where nothing meets.
+MOST_LEFT = 10.0
 #: How often the points of a pair are solved in one sweep at most.
 MOST_ROUNDS = 5
 #: Points up to which Newton's method finishes: of large piles a step's factors cost more than
@@ -134,7 +136,8 @@ def sweep(p: Points, v: F2, count: int) -> float:
 def let_jumps_count(p: Points, M: Motion, count: int, allowed: float, part: float) -> None:
     """Let that part of what a step changes of a body's velocity be left at its points.
 
-    Never less than `allowed`. An impact is taken by the step, which is off by far more.
+    Never less than `allowed`, nor more than MOST_LEFT times that. An impact is taken by the step,
+    which is off by far more.
     """
     for k in range(count):
         i, j = p.body[k, 0], p.body[k, 1]
@@ -144,7 +147,7 @@ def let_jumps_count(p: Points, M: Motion, count: int, allowed: float, part: floa
             for c in range(3):
                 square += (M.v[b, c] - M.before[b, c]) ** 2
             most = max(most, square)
-        p.counts[k] = 1.0 / max(allowed, part * math.sqrt(most))
+        p.counts[k] = 1.0 / min(max(allowed, part * math.sqrt(most)), MOST_LEFT * allowed)
 
 
 @jitable
