@@ -47,14 +47,18 @@ def test_a_block_rocks_as_housner_says(tmp_path: Path) -> None:
     Source: G. W. Housner, Bull. Seismol. Soc. Am. 53 (1963) 403.
     """
     b, c, angle = 0.1, 0.4, 0.12
-    w = rocking(tmp_path, (b, c), angle, 5e-4)["bodies/2/angular_velocity"][:, 1]
     radius, alpha = math.hypot(b, c), math.atan2(b, c)
     fall = math.cos(alpha - angle) - math.cos(alpha)
     first = math.sqrt(1.5 * G * fall / radius)
     kept = 1.0 - 1.5 * math.sin(alpha) ** 2
-    # it comes down turning about -y, goes on about the other edge, and comes back
-    assert -w.min() == pytest.approx(first, rel=2e-3)
-    assert w.max() == pytest.approx(kept * first, rel=4e-3)
+    off = []
+    for h in (1e-3, 1e-4):
+        w = rocking(tmp_path, (b, c), angle, h)["bodies/2/angular_velocity"][:, 1]
+        # it comes down turning about -y, goes on about the other edge, and comes back
+        off.append((abs(1.0 + w.min() / first), abs(1.0 - w.max() / (kept * first))))
+    assert max(off[1]) < 2e-3
+    # of order 1: a row lies up to a step before the impact
+    assert max(off[1]) < 0.2 * max(off[0])
 
 
 def test_what_rests_takes_one_sweep_a_step(tmp_path: Path) -> None:
