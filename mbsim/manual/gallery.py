@@ -1,4 +1,4 @@
-"""Pictures of the gallery page: each deck is run, shown by `mbsim view` and photographed.
+"""Photographs of runs: each deck is run, shown by `mbsim view` or a report, and photographed.
 
     python -m mbsim.manual.make gallery [NAME]...
 
@@ -7,15 +7,21 @@ It needs a Chromium, as `mbsim view --png` does.
 
 from __future__ import annotations
 
+import os
 import tempfile
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import mbsim
 from mbsim.manual.pictures import FOLDER, LARGEST
 
-#: Width and height of a picture [pixel], and how many colours it has.
-SIZE, COLOURS = (640, 400), 64
+if TYPE_CHECKING:
+    from mbsim.results.reading import Results
+
+#: Width and height of a picture [pixel], and how many colours it has: a scene, a whole page.
+SIZE, COLOURS = (640, 400), (64, 160)
+#: Of the window whose whole page is shown.
+WINDOW = (960, 600)
 
 
 class Photograph(NamedTuple):
@@ -24,11 +30,12 @@ class Photograph(NamedTuple):
     deck: str
     part: float = 0.5
     end_time: float | None = None
+    page: str = ""  # view or report: the whole page as a reader sees it
 
     @property
     def name(self) -> str:
         """Return the picture's file."""
-        return f"gallery-{self.deck}.png"
+        return f"{self.page or 'gallery'}-{self.deck}.png"
 
 
 GALLERY = (
@@ -44,6 +51,8 @@ GALLERY = (
     Photograph("slider_crank_clearance", 0.5),
     Photograph("chain_on_box", 1.0),
     Photograph("flyball_governor", 1.0, 1.0),
+    Photograph("bowling_ball", 0.3, page="view"),
+    Photograph("bowling_ball", page="report"),
 )
 
 
@@ -52,21 +61,37 @@ def take(photograph: Photograph, folder: Path = FOLDER) -> Path:
     from PIL import Image
 
     from mbsim.manual.drawings.runs import MODELS
-    from mbsim.view.page import packs_of, page
-    from mbsim.view.pictures import make
-    from mbsim.view.scene import read_scene
 
     target = folder / photograph.name
     with tempfile.TemporaryDirectory(prefix="mbsim-gallery-") as runs:
         settings: dict[str, Any] = {"end_time": photograph.end_time, "output": runs}
-        with mbsim.simulate(MODELS / f"{photograph.deck}.xml", **settings) as results:
-            scene = read_scene(results)
-            text = page(photograph.deck, {"theme": "light"}, packs_of([scene]))
-            first, last = scene.time[0], scene.time[-1]
-        at = first + photograph.part * (last - first)
-        make(text, SIZE, png=target, time=float(at))
+        deck = os.path.relpath(MODELS / f"{photograph.deck}.xml")  # as a reader would say it
+        with mbsim.simulate(deck, **settings) as results:
+            _shoot(photograph, results, Path(runs), target)
     with Image.open(target) as image:
-        image.convert("RGB").quantize(COLOURS).save(target, optimize=True)
+        image.convert("RGB").quantize(COLOURS[bool(photograph.page)]).save(target, optimize=True)
     if target.stat().st_size > LARGEST:
         raise ValueError(f"{target.name}: {target.stat().st_size} bytes, {LARGEST} at most")
     return target
+
+
+def _shoot(photograph: Photograph, results: Results, folder: Path, target: Path) -> None:
+    """Show results in a browser and write what is seen."""
+    from mbsim.view.browser import opened_page
+    from mbsim.view.page import packs_of, page
+    from mbsim.view.pictures import make
+    from mbsim.view.report import report
+    from mbsim.view.scene import read_scene
+
+    scene = read_scene(results)
+    at = float(scene.time[0] + photograph.part * (scene.time[-1] - scene.time[0]))
+    text = page(photograph.deck, {"theme": "light"}, packs_of([scene]))
+    if not photograph.page:
+        make(text, SIZE, png=target, time=at)
+        return
+    file = folder / "page.html"
+    file.write_text(report(results) if photograph.page == "report" else text, encoding="utf-8")
+    with opened_page(*WINDOW) as window:
+        window.open(file.as_uri())
+        window.run(f"mbsimReady.then(() => {{ mbsimView.setTime({at!r}); mbsimView.draw(); }})")
+        target.write_bytes(window.picture())
