@@ -269,8 +269,8 @@ class _Weights:
         """Return the normal from J into I and the distance along it, where that is simple."""
         a, b = (self.at.markers[shape.marker_id] for shape in shapes)
         if shapes[1].shape == "PLANE":
-            ends = graphic_box(shapes[0], b.R.T @ (a.p - b.p), b.R.T @ a.R)
-            return (b.R[:, 2], float(ends[0][2])) if ends is not None else (None, 0.0)
+            least = graphic_box(shapes[0], b.R.T @ (a.p - b.p), b.R.T @ a.R)
+            return (b.R[:, 2], float(least[0][2])) if least is not None else (None, 0.0)
         if shapes[0].shape == shapes[1].shape == "SPHERE":
             between = a.p - b.p
             distance = float(np.linalg.norm(between))
