@@ -10,9 +10,12 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, rotate, scale, sub, unrotate, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.forces import sides
-from mbsim.dynamics.events.stability import HELD_BACK
 from mbsim.geometry.catalog import AT_NORMAL, AT_POINT
 from mbsim.laws.abi import FORCE_X_OUT, FORCE_Y_OUT, TORQUE_Z_OUT
+
+
+#: Part of the friction that would stop a slip in one step, which a fixed-step method may use.
+HELD_BACK = 0.25
 
 
 @jitable

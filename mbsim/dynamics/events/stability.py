@@ -42,11 +42,10 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, norm, rotate, scale, sub, unrotate
 from mbsim.dynamics.bodies.kinematics import place_bodies, position
 from mbsim.dynamics.bodies.markers import marker_arm, marker_axis, marker_point
+from mbsim.dynamics.contact.fixed_step import HELD_BACK
 
 #: Tolerance at which the step is half of the stability bound of an undamped vibration.
 COARSE = 1e-3
-#: Part of the friction that would stop a slip in one step, which a fixed-step method may use.
-HELD_BACK = 0.25
 #: Tolerance from which on steps follow friction.
 FOLLOWED = 1e-5
 #: Largest step over half of the bound; the bound is below the true limit.
