@@ -13,7 +13,6 @@ from mbsim.dynamics.contact.forces import sides
 from mbsim.geometry.catalog import AT_NORMAL, AT_POINT
 from mbsim.laws.abi import FORCE_X_OUT, FORCE_Y_OUT, TORQUE_Z_OUT
 
-
 #: Part of the friction that would stop a slip in one step, which a fixed-step method may use.
 HELD_BACK = 0.25
 
