@@ -31,6 +31,8 @@ from numba import types
 
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
+from mbsim.core.problem import Problem
+from mbsim.integrators.rates import largest_rate
 from mbsim.integrators.scheme import (
     BEGUN,
     BEGUN_WORK,
@@ -159,7 +161,7 @@ def is_stiff(m: Method, h: float, t_end: float) -> bool:
 
 
 @jitable
-def is_calm(m: Method, context: int, probe: int, t_end: float) -> bool:
+def is_calm(p: Problem, m: Method, context: int, probe: int, t_end: float) -> bool:
     """Try an explicit step now and then; return whether to change back, with a step to begin."""
     m.memory[IMPLICIT_STEPS] += 1.0
     taken = m.memory[IMPLICIT_STEPS]
@@ -181,6 +183,11 @@ def is_calm(m: Method, context: int, probe: int, t_end: float) -> bool:
             part = min(part, WITHIN / m.memory[STIFFNESS])
     work = m.counts[EVALUATIONS] - EVALUATIONS_A_STEP + m.counts[JACOBIANS] - m.memory[BEGUN_WORK]
     gain = -math.inf
+    if part > 0.0 and IMPLICIT_WORK * work / taken > EVALUATIONS_A_STEP / part:
+        # where the motion excites nothing that is fast the stages do not tell
+        rate = largest_rate(p, m, t)
+        if rate > 0.0:
+            part = min(part, WITHIN / (rate * h))
     if part > 0.0:
         # of steps of this length, and no more time than they took: short ones are behind an event
         each = IMPLICIT_WORK * work / taken
@@ -201,8 +208,8 @@ def is_calm(m: Method, context: int, probe: int, t_end: float) -> bool:
 
 def serve(context: int, probe: int, t_end: float) -> int:
     """Whether the implicit method is to be left: behind an address, for most runs never take it."""
-    _, m = in_workspace(context)
-    return 1 if is_calm(m, context, probe, t_end) else 0
+    p, m = in_workspace(context)
+    return 1 if is_calm(p, m, context, probe, t_end) else 0
 
 
 @jitable
