@@ -29,7 +29,7 @@ import math
 
 from numba import types
 
-from mbsim.core.address import call_int
+from mbsim.core.address import call_float, call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import Problem
 from mbsim.integrators.rates import largest_rate
@@ -45,6 +45,8 @@ from mbsim.integrators.scheme import (
     JACOBIANS,
     LAST_ERROR,
     LAST_STEP,
+    MEASURED,
+    MEASURED_AT,
     PACE,
     PATIENCE,
     RELUCTANCE,
@@ -73,13 +75,15 @@ THROWS = 0.1
 STEADY = 3
 #: Steps found stiff before AUTO changes over, and others that make it forget them.
 FIRST_PATIENCE, FORGET = 15, 6
+#: Explicit steps for which a measured rate is believed.
+HOLDS = 10
 #: Steps over which their number a time is taken: an impact is shorter.
 WINDOW = 200
 #: Of the explicit method, where nothing is taken again: what work is counted in.
 EVALUATIONS_A_STEP = 6.0
 #: A change is worth it for so many steps that are still to be taken; once the implicit method has
 #: run, and nothing is to be loaded for it, for fewer.
-WORTH, WORTH_AGAIN = 2000, 200
+WORTH, WORTH_AGAIN = 400, 200
 #: With so many ahead the implicit method is tried after as many steps as there is patience for.
 MANY = 20_000
 #: For fewer steps that stability does not bound it was not worth it to leave the implicit method.
@@ -109,21 +113,53 @@ def is_bounded(m: Method) -> bool:
 
 
 @jitable
+def stiffness_of(m: Method, h: float) -> float:
+    """Return a step of length h times the largest rate, by its stages or as measured of late."""
+    of_late = m.memory[EXPLICIT_STEPS] - m.memory[MEASURED_AT] <= HOLDS
+    return max(m.memory[STIFFNESS], h * m.memory[MEASURED] if of_late else 0.0)
+
+
+@jitable
 def stay_within(m: Method, h: float, error: float) -> None:
     """Let the step after one of length h and this error end within the bound of stability.
 
     A step is no more than halved, for a kink looks like a high rate.
     """
     if m.memory[STIFFNESS] > 0.0 and error > NOTHING:
-        m.memory[STEP] = min(m.memory[STEP], max(0.5, WITHIN / m.memory[STIFFNESS]) * h)
+        m.memory[STEP] = min(m.memory[STEP], max(0.5, WITHIN / stiffness_of(m, h)) * h)
 
 
 @jitable
-def is_stiff(m: Method, h: float, t_end: float) -> bool:
-    """Note what the last explicit step found; return whether to change over."""
-    if m.memory[STIFFNESS] > BOUND:
+def note_pace(m: Method, t: float) -> None:
+    """Count an explicit step, and note how many there are a time."""
+    m.memory[EXPLICIT_STEPS] += 1.0
+    steps = m.memory[EXPLICIT_STEPS]
+    # the run so far: after a change back only whole windows count, for that may be in an impact
+    if steps % WINDOW == 0.0 or m.counts[STEPS] <= min(steps, WINDOW):
+        work = m.counts[EVALUATIONS] - m.memory[BEGUN_WORK]
+        m.memory[PACE] = work / EVALUATIONS_A_STEP / (t - m.memory[BEGUN])
+    if steps % WINDOW == 0.0:
+        m.memory[BEGUN], m.memory[BEGUN_WORK] = t, m.counts[EVALUATIONS]
+
+
+@jitable
+def measure(m: Method, steps: Steps) -> None:
+    """Note the largest rate about the committed point."""
+    m.memory[MEASURED] = call_float(steps.rate, (steps.context, m.memory[TIME]))
+    m.memory[MEASURED_AT] = m.memory[EXPLICIT_STEPS]
+
+
+@jitable
+def count_stiff(m: Method, steps: Steps, h: float, enough: bool) -> None:
+    """Count a step of length h that was at the bound of stability, or one that was not."""
+    shown = m.memory[STIFFNESS] > BOUND
+    stale = m.memory[EXPLICIT_STEPS] - m.memory[MEASURED_AT] > HOLDS
+    if shown and enough and (stale or m.memory[MEASURED] == 0.0):
+        measure(m, steps)
+    if stiffness_of(m, h) > BOUND:
         # a hidden rate is far beyond the bound: what else it bounds trembles soon
-        m.memory[STIFF_STEPS] += 2.0 if m.memory[STIFFNESS] == math.inf else 1.0
+        sure = m.memory[STIFFNESS] == math.inf or not shown or h * m.memory[MEASURED] > BOUND
+        m.memory[STIFF_STEPS] += 2.0 if sure else 1.0
         m.memory[CALM_STEPS] = 0.0
         m.memory[STIFF_STEP] = h
     elif m.memory[STIFF_STEPS] > 0.0:
@@ -133,14 +169,14 @@ def is_stiff(m: Method, h: float, t_end: float) -> bool:
             m.memory[STIFF_STEPS] = 0.0
     if m.memory[LAST_STEP] < THROWS * m.memory[STIFF_STEP]:
         m.memory[BOUNDED] = 1.0
-    m.memory[EXPLICIT_STEPS] += 1.0
-    t, steps = m.memory[TIME], m.memory[EXPLICIT_STEPS]
-    # the run so far: after a change back only whole windows count, for that may be in an impact
-    if steps % WINDOW == 0.0 or m.counts[STEPS] <= min(steps, WINDOW):
-        work = m.counts[EVALUATIONS] - m.memory[BEGUN_WORK]
-        m.memory[PACE] = work / EVALUATIONS_A_STEP / (t - m.memory[BEGUN])
-    if steps % WINDOW == 0.0:
-        m.memory[BEGUN], m.memory[BEGUN_WORK] = t, m.counts[EVALUATIONS]
+
+
+@jitable
+def is_stiff(m: Method, steps: Steps, h: float, t_end: float) -> bool:
+    """Note what the last explicit step found; return whether to change over."""
+    t = m.memory[TIME]
+    note_pace(m, t)
+    taken = m.memory[EXPLICIT_STEPS]
     # steps that grow, as from a start, are not yet those to come
     most = (t_end - t) / m.memory[STEP] if m.memory[WAS_CUT] == 0.0 else math.inf
     ahead = min((t_end - t) * m.memory[PACE], most)
@@ -151,13 +187,20 @@ def is_stiff(m: Method, h: float, t_end: float) -> bool:
         enough = min((t_end - t) * m.memory[COSTLY], most) > WORTH_AGAIN
     else:
         enough = ahead > WORTH_AGAIN
+    count_stiff(m, steps, h, enough)
     if enough and m.memory[STIFF_STEPS] > 1.0:
         m.memory[BOUNDED] = 1.0
     # as many steps a time as when it was stiff: it is so again, though nothing else may show it
-    again = m.memory[PACE] >= m.memory[COSTLY] and steps >= max(WINDOW, m.memory[PATIENCE])
+    again = m.memory[PACE] >= m.memory[COSTLY] and taken >= max(WINDOW, m.memory[PATIENCE])
+    if m.memory[STIFF_STEPS] >= m.memory[PATIENCE] and enough and not again:
+        # what was in touch may have left since it was measured
+        if m.memory[EXPLICIT_STEPS] > m.memory[MEASURED_AT]:
+            measure(m, steps)
+        if max(m.memory[STIFFNESS], h * m.memory[MEASURED]) <= BOUND:
+            m.memory[STIFF_STEPS] = 0.0
     if again or m.memory[STIFF_STEPS] >= m.memory[PATIENCE]:
         return enough
-    return ahead > MANY and steps >= m.memory[PATIENCE]
+    return ahead > MANY and taken >= m.memory[PATIENCE]
 
 
 @jitable
@@ -217,4 +260,4 @@ def changes_over(m: Method, steps: Steps, h: float, t_end: float) -> bool:
     """Return whether the other method is to go on from the committed point."""
     if steps.implicit:
         return call_int(steps.calm, (steps.context, steps.probe, t_end)) == 1
-    return is_stiff(m, h, t_end)
+    return is_stiff(m, steps, h, t_end)

@@ -10,12 +10,16 @@ from __future__ import annotations
 
 import math
 
+from numba import types
+
 from mbsim.core.address import call_float, call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import EACH, POSITION, RATES, Problem
 from mbsim.integrators.dopri5 import DIFFERENCES, rate_of
-from mbsim.integrators.scheme import EVALUATIONS, OWN_TIME, TOL, Method, failure_or, project
+from mbsim.integrators.scheme import EVALUATIONS, OWN_TIME, TOL, Method, failure_or, in_workspace, project
 
+#: Of `serve`: context, time.
+ASKED = types.float64(types.int64, types.float64)
 #: How far the state is moved, of the tolerance, and at least: far above rounding.
 MOVED, LEAST = 1e-2, 1e-9
 #: How often; the last two count, for a vibration may be in its middle at one of them.
@@ -95,3 +99,9 @@ def largest_rate(p: Problem, m: Method, t: float) -> float:
         if j >= TIMES - COUNT:
             rate = max(rate, found)
     return rate
+
+
+def serve(context: int, t: float) -> float:
+    """The largest rate about the committed point, behind an address: most runs never ask."""
+    p, m = in_workspace(context)
+    return largest_rate(p, m, t)

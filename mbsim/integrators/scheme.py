@@ -96,7 +96,9 @@ THIRD_AT = 54
 LOOKS, LOAD_THEN, SWITCHED, REACH = range(55, 59)
 # the most that the error of a step of order 2 may be, whatever tol is
 HELD = 59
-MEMORY = 60
+# of AUTO: the largest rate of f as it was measured last, and at which explicit step
+MEASURED, MEASURED_AT = range(60, 62)
+MEMORY = 62
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
@@ -167,11 +169,13 @@ class Steps(NamedTuple):
     implicit: bool
     resumes: float
     # what only some problems need, 0 for others: `branches.serve`, `events.serve`; of AUTO's
-    # implicit method `attempt` of the explicit one, and `changing.serve` that tries it
+    # implicit method `attempt` of the explicit one, and `changing.serve` that tries it; of AUTO's
+    # explicit method `rates.serve`
     branches: int
     events: int
     probe: int
     calm: int
+    rate: int
 
 
 def make(scheme: Scheme, y0: Any, t0: float, kinds: Any = None, rows: int = 1) -> Method:
