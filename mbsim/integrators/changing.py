@@ -75,8 +75,9 @@ THROWS = 0.1
 STEADY = 3
 #: Steps found stiff before AUTO changes over, and others that make it forget them.
 FIRST_PATIENCE, FORGET = 15, 6
-#: Explicit steps for which a measured rate is believed.
-HOLDS = 10
+#: Explicit steps for which a measured rate is believed. Below this error, over the allowed one, it
+#: alone bounds a step: else the motion bounds it, too, and the implicit method takes no longer ones.
+HOLDS, FREE = 10, 5e-3
 #: Steps over which their number a time is taken: an impact is shorter.
 WINDOW = 200
 #: Of the explicit method, where nothing is taken again: what work is counted in.
@@ -158,8 +159,10 @@ def count_stiff(m: Method, steps: Steps, h: float, enough: bool) -> None:
         measure(m, steps)
     if stiffness_of(m, h) > BOUND:
         # a hidden rate is far beyond the bound: what else it bounds trembles soon
-        sure = m.memory[STIFFNESS] == math.inf or not shown or h * m.memory[MEASURED] > BOUND
-        m.memory[STIFF_STEPS] += 2.0 if sure else 1.0
+        measured = h * m.memory[MEASURED] > BOUND and m.memory[LAST_ERROR] < FREE
+        if shown or measured:
+            hidden = m.memory[STIFFNESS] == math.inf
+            m.memory[STIFF_STEPS] += 2.0 if hidden or measured else 1.0
         m.memory[CALM_STEPS] = 0.0
         m.memory[STIFF_STEP] = h
     elif m.memory[STIFF_STEPS] > 0.0:
@@ -235,13 +238,16 @@ def is_calm(p: Problem, m: Method, context: int, probe: int, t_end: float) -> bo
         # of steps of this length, and no more time than they took: short ones are behind an event
         each = IMPLICIT_WORK * work / taken
         gain = (each - EVALUATIONS_A_STEP / part) * min((t - m.memory[BEGUN]) / h, taken)
+    # what it takes a time, against what the explicit method took: of that the trial is another word
+    costly = IMPLICIT_WORK * work > EVALUATIONS_A_STEP * m.memory[COSTLY] * (t - m.memory[BEGUN])
+    agreed = 1.0 if costly else 0.5
     m.memory[BEGUN] = t
     m.memory[BEGUN_WORK] = m.counts[EVALUATIONS] + m.counts[JACOBIANS]
     # a short step, as after a change or a switch, is good for either method: one that is shorter
     # than before the model was found stiff tells less
     short = min(1.0, part) * h * m.memory[PACE] < 1.0
     # what one trial tells is of where it was made
-    gain = min(gain * (SHORT_TELLS if short else 1.0), 0.5 * WRONG * m.memory[RELUCTANCE])
+    gain = min(gain * (SHORT_TELLS if short else 1.0), agreed * WRONG * m.memory[RELUCTANCE])
     m.memory[CALM_STEPS] = max(0.0, m.memory[CALM_STEPS] + gain)
     if m.memory[CALM_STEPS] < WRONG * m.memory[RELUCTANCE]:
         return False
