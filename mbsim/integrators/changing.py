@@ -76,8 +76,9 @@ STEADY = 3
 #: Steps found stiff before AUTO changes over, and others that make it forget them.
 FIRST_PATIENCE, FORGET = 15, 6
 #: Explicit steps for which a measured rate is believed. Below this error, over the allowed one, it
-#: alone bounds a step: else the motion bounds it, too, and the implicit method takes no longer ones.
-HOLDS, FREE = 10, 5e-3
+#: alone bounds a step: else the motion does, too, and the implicit method takes no longer ones.
+#: Such a step counts as so many.
+HOLDS, FREE, SURE = 10, 5e-3, 3.0
 #: Steps over which their number a time is taken: an impact is shorter.
 WINDOW = 200
 #: Of the explicit method, where nothing is taken again: what work is counted in.
@@ -114,20 +115,13 @@ def is_bounded(m: Method) -> bool:
 
 
 @jitable
-def stiffness_of(m: Method, h: float) -> float:
-    """Return a step of length h times the largest rate, by its stages or as measured of late."""
-    of_late = m.memory[EXPLICIT_STEPS] - m.memory[MEASURED_AT] <= HOLDS
-    return max(m.memory[STIFFNESS], h * m.memory[MEASURED] if of_late else 0.0)
-
-
-@jitable
 def stay_within(m: Method, h: float, error: float) -> None:
     """Let the step after one of length h and this error end within the bound of stability.
 
     A step is no more than halved, for a kink looks like a high rate.
     """
     if m.memory[STIFFNESS] > 0.0 and error > NOTHING:
-        m.memory[STEP] = min(m.memory[STEP], max(0.5, WITHIN / stiffness_of(m, h)) * h)
+        m.memory[STEP] = min(m.memory[STEP], max(0.5, WITHIN / m.memory[STIFFNESS]) * h)
 
 
 @jitable
@@ -153,19 +147,17 @@ def measure(m: Method, steps: Steps) -> None:
 @jitable
 def count_stiff(m: Method, steps: Steps, h: float, enough: bool) -> None:
     """Count a step of length h that was at the bound of stability, or one that was not."""
-    shown = m.memory[STIFFNESS] > BOUND
-    stale = m.memory[EXPLICIT_STEPS] - m.memory[MEASURED_AT] > HOLDS
-    if shown and enough and (stale or m.memory[MEASURED] == 0.0):
-        measure(m, steps)
-    if stiffness_of(m, h) > BOUND:
+    since = m.memory[EXPLICIT_STEPS] - m.memory[MEASURED_AT]
+    if m.memory[STIFFNESS] > BOUND:
+        if enough and since >= HOLDS:
+            measure(m, steps)
         # a hidden rate is far beyond the bound: what else it bounds trembles soon
-        measured = h * m.memory[MEASURED] > BOUND and m.memory[LAST_ERROR] < FREE
-        if shown or measured:
-            hidden = m.memory[STIFFNESS] == math.inf
-            m.memory[STIFF_STEPS] += 2.0 if hidden or measured else 1.0
+        hidden = m.memory[STIFFNESS] == math.inf
+        alone = h * m.memory[MEASURED] > BOUND and m.memory[LAST_ERROR] < FREE
+        m.memory[STIFF_STEPS] += SURE if alone else (2.0 if hidden else 1.0)
         m.memory[CALM_STEPS] = 0.0
         m.memory[STIFF_STEP] = h
-    elif m.memory[STIFF_STEPS] > 0.0:
+    elif m.memory[STIFF_STEPS] > 0.0 and (since > HOLDS or h * m.memory[MEASURED] <= BOUND):
         # what trembles leaves and touches: the short steps behind that are not what bounds it
         m.memory[CALM_STEPS] += min(1.0, m.memory[LAST_STEP] / m.memory[STIFF_STEP])
         if m.memory[CALM_STEPS] >= FORGET:
@@ -199,7 +191,7 @@ def is_stiff(m: Method, steps: Steps, h: float, t_end: float) -> bool:
         # what was in touch may have left since it was measured
         if m.memory[EXPLICIT_STEPS] > m.memory[MEASURED_AT]:
             measure(m, steps)
-        if max(m.memory[STIFFNESS], h * m.memory[MEASURED]) <= BOUND:
+        if h * m.memory[MEASURED] <= BOUND and m.memory[STIFFNESS] < math.inf:
             m.memory[STIFF_STEPS] = 0.0
     if again or m.memory[STIFF_STEPS] >= m.memory[PATIENCE]:
         return enough

@@ -38,7 +38,7 @@ FEW = 16
 #: costs about what the implicit method takes until it runs well from anywhere else.
 BEGIN_STEPS = 4 * FIRST_PATIENCE
 #: By how much AUTO is slower to change after what did not pay, at most.
-MOST_LEARNT = 4.0
+MOST_LEARNT = 16.0
 #: The part of a step's error that Newton's iteration may leave where friction holds without give.
 #: What that decides by are forces, over their limits: a few 1e-9 m of a stiff contact, far less
 #: than the error of a step, made it slip.
@@ -209,7 +209,9 @@ class Methods:
         if not stiff:
             took = IMPLICIT_START + IMPLICIT_WORK * (work - self._since[1])
             instead = EVALUATIONS_A_STEP * memory[scheme.COSTLY] * (now - self._since[0])
-            factor = min(MOST_LEARNT, max(1.0 / 1.5, took / instead))
+            factor = min(MOST_LEARNT, max(1.0 / 1.5, (took / instead) ** 2))
+            # with fewer explicit steps a time it does not pay
+            memory[scheme.COSTLY] *= max(1.0, took / instead)
             memory[scheme.PATIENCE] = max(FIRST_PATIENCE, factor * memory[scheme.PATIENCE])
         elif self.changes > 0:
             free = memory[scheme.EXPLICIT_STEPS] - memory[scheme.STIFF_STEPS]
