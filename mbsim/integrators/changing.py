@@ -45,8 +45,6 @@ from mbsim.integrators.scheme import (
     JACOBIANS,
     LAST_ERROR,
     LAST_STEP,
-    MEASURED,
-    MEASURED_AT,
     PACE,
     PATIENCE,
     RELUCTANCE,
@@ -75,10 +73,6 @@ THROWS = 0.1
 STEADY = 3
 #: Steps found stiff before AUTO changes over, and others that make it forget them.
 FIRST_PATIENCE, FORGET = 15, 6
-#: Explicit steps for which a measured rate is believed. Below this error, over the allowed one, it
-#: alone bounds a step: else the motion does, too, and the implicit method takes no longer ones.
-#: Such a step counts as so many.
-HOLDS, FREE, SURE = 10, 5e-3, 3.0
 #: Steps over which their number a time is taken: an impact is shorter.
 WINDOW = 200
 #: Of the explicit method, where nothing is taken again: what work is counted in.
@@ -86,6 +80,8 @@ EVALUATIONS_A_STEP = 6.0
 #: A change is worth it for so many steps that are still to be taken; once the implicit method has
 #: run, and nothing is to be loaded for it, for fewer.
 WORTH, WORTH_AGAIN = 400, 200
+#: At the begin, where the largest rate is measured: what is lost if it was wrong is small then.
+WORTH_AT_ONCE = 4000
 #: With so many ahead the implicit method is tried after as many steps as there is patience for.
 MANY = 20_000
 #: For fewer steps that stability does not bound it was not worth it to leave the implicit method.
@@ -138,26 +134,14 @@ def note_pace(m: Method, t: float) -> None:
 
 
 @jitable
-def measure(m: Method, steps: Steps) -> None:
-    """Note the largest rate about the committed point."""
-    m.memory[MEASURED] = call_float(steps.rate, (steps.context, m.memory[TIME]))
-    m.memory[MEASURED_AT] = m.memory[EXPLICIT_STEPS]
-
-
-@jitable
-def count_stiff(m: Method, steps: Steps, h: float, enough: bool) -> None:
+def count_stiff(m: Method, h: float) -> None:
     """Count a step of length h that was at the bound of stability, or one that was not."""
-    since = m.memory[EXPLICIT_STEPS] - m.memory[MEASURED_AT]
     if m.memory[STIFFNESS] > BOUND:
-        if enough and since >= HOLDS:
-            measure(m, steps)
         # a hidden rate is far beyond the bound: what else it bounds trembles soon
-        hidden = m.memory[STIFFNESS] == math.inf
-        alone = h * m.memory[MEASURED] > BOUND and m.memory[LAST_ERROR] < FREE
-        m.memory[STIFF_STEPS] += SURE if alone else (2.0 if hidden else 1.0)
+        m.memory[STIFF_STEPS] += 2.0 if m.memory[STIFFNESS] == math.inf else 1.0
         m.memory[CALM_STEPS] = 0.0
         m.memory[STIFF_STEP] = h
-    elif m.memory[STIFF_STEPS] > 0.0 and (since > HOLDS or h * m.memory[MEASURED] <= BOUND):
+    elif m.memory[STIFF_STEPS] > 0.0:
         # what trembles leaves and touches: the short steps behind that are not what bounds it
         m.memory[CALM_STEPS] += min(1.0, m.memory[LAST_STEP] / m.memory[STIFF_STEP])
         if m.memory[CALM_STEPS] >= FORGET:
@@ -167,10 +151,24 @@ def count_stiff(m: Method, steps: Steps, h: float, enough: bool) -> None:
 
 
 @jitable
+def begins_stiff(m: Method, steps: Steps, t_end: float) -> bool:
+    """Return whether stability will bound so many steps that the implicit method is to begin."""
+    rate, t = call_float(steps.rate, (steps.context, m.memory[TIME])), m.memory[TIME]
+    if not WORTH_AT_ONCE * WITHIN < rate * (t_end - t) < math.inf:
+        return False
+    m.memory[PACE] = rate / WITHIN
+    m.memory[STIFF_STEPS] = m.memory[PATIENCE]
+    return True
+
+
+@jitable
 def is_stiff(m: Method, steps: Steps, h: float, t_end: float) -> bool:
     """Note what the last explicit step found; return whether to change over."""
     t = m.memory[TIME]
     note_pace(m, t)
+    if m.counts[STEPS] == 1 and begins_stiff(m, steps, t_end):
+        return True
+    count_stiff(m, h)
     taken = m.memory[EXPLICIT_STEPS]
     # steps that grow, as from a start, are not yet those to come
     most = (t_end - t) / m.memory[STEP] if m.memory[WAS_CUT] == 0.0 else math.inf
@@ -182,17 +180,10 @@ def is_stiff(m: Method, steps: Steps, h: float, t_end: float) -> bool:
         enough = min((t_end - t) * m.memory[COSTLY], most) > WORTH_AGAIN
     else:
         enough = ahead > WORTH_AGAIN
-    count_stiff(m, steps, h, enough)
     if enough and m.memory[STIFF_STEPS] > 1.0:
         m.memory[BOUNDED] = 1.0
     # as many steps a time as when it was stiff: it is so again, though nothing else may show it
     again = m.memory[PACE] >= m.memory[COSTLY] and taken >= max(WINDOW, m.memory[PATIENCE])
-    if m.memory[STIFF_STEPS] >= m.memory[PATIENCE] and enough and not again:
-        # what was in touch may have left since it was measured
-        if m.memory[EXPLICIT_STEPS] > m.memory[MEASURED_AT]:
-            measure(m, steps)
-        if h * m.memory[MEASURED] <= BOUND and m.memory[STIFFNESS] < math.inf:
-            m.memory[STIFF_STEPS] = 0.0
     if again or m.memory[STIFF_STEPS] >= m.memory[PATIENCE]:
         return enough
     return ahead > MANY and taken >= m.memory[PATIENCE]

@@ -96,9 +96,7 @@ THIRD_AT = 54
 LOOKS, LOAD_THEN, SWITCHED, REACH = range(55, 59)
 # the most that the error of a step of order 2 may be, whatever tol is
 HELD = 59
-# of AUTO: the largest rate of f as it was measured last, and at which explicit step
-MEASURED, MEASURED_AT = range(60, 62)
-MEMORY = 62
+MEMORY = 60
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)

@@ -245,7 +245,6 @@ class Methods:
         memory[scheme.PACE] = often if stiff else 0.0
         memory[scheme.STIFF_STEPS] = memory[scheme.CALM_STEPS] = 0.0
         memory[scheme.EXPLICIT_STEPS] = memory[scheme.IMPLICIT_STEPS] = 0.0
-        memory[scheme.MEASURED] = memory[scheme.MEASURED_AT] = 0.0
         self.arrays.dense[...] = 0.0
         self._forget()
         self.changes += 1
