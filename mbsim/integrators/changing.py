@@ -55,6 +55,7 @@ from mbsim.integrators.scheme import (
     STIFFNESS,
     TIME,
     WAS_CUT,
+    WATCH,
     Method,
     Steps,
     failure_or,
@@ -79,7 +80,7 @@ WINDOW = 200
 EVALUATIONS_A_STEP = 6.0
 #: A change is worth it for so many steps that are still to be taken; once the implicit method has
 #: run, and nothing is to be loaded for it, for fewer.
-WORTH, WORTH_AGAIN = 400, 200
+WORTH, WORTH_AGAIN = 300, 200
 #: At the begin, where the largest rate is measured: what is lost if it was wrong is small then.
 WORTH_AT_ONCE = 4000
 #: With so many ahead the implicit method is tried after as many steps as there is patience for.
@@ -153,7 +154,10 @@ def count_stiff(m: Method, h: float) -> None:
 @jitable
 def begins_stiff(m: Method, steps: Steps, t_end: float) -> bool:
     """Return whether stability will bound so many steps that the implicit method is to begin."""
-    rate, t = call_float(steps.rate, (steps.context, m.memory[TIME])), m.memory[TIME]
+    if m.memory[WATCH] == 0.0 or steps.rate == 0 or m.counts[STEPS] > 0:
+        return False
+    t = m.memory[TIME]
+    rate = call_float(steps.rate, (steps.context, t))
     if not WORTH_AT_ONCE * WITHIN < rate * (t_end - t) < math.inf:
         return False
     m.memory[PACE] = rate / WITHIN
@@ -166,8 +170,6 @@ def is_stiff(m: Method, steps: Steps, h: float, t_end: float) -> bool:
     """Note what the last explicit step found; return whether to change over."""
     t = m.memory[TIME]
     note_pace(m, t)
-    if m.counts[STEPS] == 1 and begins_stiff(m, steps, t_end):
-        return True
     count_stiff(m, h)
     taken = m.memory[EXPLICIT_STEPS]
     # steps that grow, as from a start, are not yet those to come

@@ -35,7 +35,7 @@ from mbsim.core.problem import (
 )
 from mbsim.integrators.attempt import LOCATED, attempt_to_event
 from mbsim.integrators.branches import BEGIN, TAKEN
-from mbsim.integrators.changing import changes_over, is_bounded, stay_within
+from mbsim.integrators.changing import begins_stiff, changes_over, is_bounded, stay_within
 from mbsim.integrators.control import (
     HOLD,
     extrapolated_factor,
@@ -391,6 +391,8 @@ def advance(  # noqa: C901
             if code != 0:
                 m.counts[CODE] = code
                 return FAILED
+            if begins_stiff(m, steps, t_end):
+                return CHANGES_OVER
         floor = smallest_step(t, m.memory[OWN_TIME], h_min)
         if steps.order == 0.0 and t >= m.memory[FAILED_AT] and bound_is_due(m):
             m.memory[STEP] = stable(p, m, t, h_max)
