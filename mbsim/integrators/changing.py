@@ -80,7 +80,7 @@ WINDOW = 200
 EVALUATIONS_A_STEP = 6.0
 #: A change is worth it for so many steps that are still to be taken; once the implicit method has
 #: run, and nothing is to be loaded for it, for fewer.
-WORTH, WORTH_AGAIN = 300, 200
+WORTH, WORTH_AGAIN = 400, 200
 #: At the begin, where the largest rate is measured: what is lost if it was wrong is small then.
 WORTH_AT_ONCE = 4000
 #: With so many ahead the implicit method is tried after as many steps as there is patience for.
@@ -160,7 +160,8 @@ def begins_stiff(m: Method, steps: Steps, t_end: float) -> bool:
     rate = call_float(steps.rate, (steps.context, t))
     if not WORTH_AT_ONCE * WITHIN < rate * (t_end - t) < math.inf:
         return False
-    m.memory[PACE] = rate / WITHIN
+    # the steps that stability would bound: shorter ones of a transient are good for either method
+    m.memory[STEP], m.memory[PACE] = WITHIN / rate, rate / WITHIN
     m.memory[STIFF_STEPS] = m.memory[PATIENCE]
     return True
 

@@ -16,7 +16,15 @@ from mbsim.core.address import call_float, call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import EACH, POSITION, RATES, Problem
 from mbsim.integrators.dopri5 import DIFFERENCES, rate_of
-from mbsim.integrators.scheme import EVALUATIONS, OWN_TIME, TOL, Method, failure_or, in_workspace, project
+from mbsim.integrators.scheme import (
+    EVALUATIONS,
+    OWN_TIME,
+    TOL,
+    Method,
+    failure_or,
+    in_workspace,
+    project,
+)
 
 #: Of `serve`: context, time.
 ASKED = types.float64(types.int64, types.float64)
