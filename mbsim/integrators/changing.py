@@ -8,7 +8,10 @@ The error lets steps go beyond that bound; where many are at it, they are kept w
 The implicit method tries an explicit step now and then. What its own last steps took, less what
 explicit ones would have taken instead, is summed up; where that is as much as it would cost to be
 wrong, and two trials agree, the explicit method goes on. `Methods.change_over` learns from what
-came of a change. A run that is stiff from its begin begins anew: `Methods.begin_anew`.
+came of a change. A run that is stiff from its begin begins anew: `Methods.begin_anew`. Where the
+rate at the begin, measured (`rates.largest_rate`), would bound very many steps, it does so at once.
+That rate is asked for as well before the implicit method is left: the stages of a trial on a motion
+that holds what is fast tell nothing of that.
 
 How many steps are ahead is judged by the pace of the run so far, and of the last WINDOW steps once
 there are so many: an impact after a flight takes little of the run, and is over before there are.

@@ -62,7 +62,34 @@ def test_a_run_that_is_stiff_from_its_begin_is_the_implicit_method_s(name, tol):
     assert there <= here < 1.1 * there
 
 
-@pytest.mark.parametrize("name", ["drop_m", "bowling_ball", "incline_slip"])
+@pytest.mark.parametrize("name", ["incline_slip", "incline_creep", "stiff/rolling_sphere"])
+def test_where_stability_would_bound_thousands_of_steps_radau5_begins_at_once(name):
+    """Tried first, explicit steps cost as much as the whole run of RADAU5, or 13 times that."""
+    model = mbsim.read_model(MODELS / f"{name}.xml")
+    auto, implicit = (mbsim.simulate(model, integrator=one) for one in ("AUTO", "RADAU5"))
+    assert auto.stats["method_changes"] == 1
+    assert auto.stats["steps"] == implicit.stats["steps"]
+    np.testing.assert_array_equal(auto["bodies/2/position"], implicit["bodies/2/position"])
+    # six to measure the rate, two for a first step; later ones are measured in trials
+    tried = auto.stats["rhs_evaluations"] - implicit.stats["rhs_evaluations"]
+    assert 0 < tried < 20 + 0.05 * implicit.stats["rhs_evaluations"]
+
+
+@pytest.mark.parametrize("tol", [1e-4, 1e-5])
+@pytest.mark.parametrize("name", ["stiff/torsion_top", "lugre_stick_slip"])
+def test_it_stays_where_the_motion_excites_nothing_that_is_fast(name, tol):
+    """The stages of a trial on such a motion tell of no rate: 3 to 7 changes."""
+    stats = mbsim.simulate(mbsim.read_model(MODELS / f"{name}.xml"), tol=tol).stats
+    assert stats["method_changes"] == 1
+
+
+def test_what_did_not_pay_is_not_tried_again_and_again():
+    """Where explicit steps are at the bound, but the motion has as short ones: 16 changes."""
+    stats = mbsim.simulate(mbsim.read_model(MODELS / "cam_from_stl.xml"), tol=1e-3).stats
+    assert stats["method_changes"] <= 6
+
+
+@pytest.mark.parametrize("name", ["drop_m", "bowling_ball", "sdnd121"])
 def test_an_impact_or_a_short_stiff_run_changes_nothing(name):
     auto = mbsim.simulate(mbsim.read_model(MODELS / f"{name}.xml"))
     assert auto.stats["method_changes"] == auto.stats["jacobians"] == 0
