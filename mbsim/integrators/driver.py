@@ -15,6 +15,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.problem import (
     BY_CHECK,
     BY_ERROR,
+    BY_JUMP,
     BY_NEWTON,
     BY_NOT_FINITE,
     CHANGES_OVER,
@@ -44,6 +45,7 @@ from mbsim.integrators.control import (
     smallest_step,
     starting_step,
 )
+from mbsim.integrators.positions import jumps
 from mbsim.integrators.scheme import (
     AFTER_REJECTION,
     CHANGE_DUE,
@@ -384,6 +386,9 @@ def advance(  # noqa: C901
                 # behind the switch all is known anew
                 m.memory[TIME] = min(m.memory[ROW_ENDS], t_end)
                 m.memory[HAVE_F] = 0.0
+                if steps.order > 0.0 and jumps(p, m, m.memory[TIME]):
+                    m.counts[LAST_REASON] = BY_JUMP
+                    return STEP_TOO_SMALL
                 continue
         t = m.memory[TIME]
         if m.memory[HAVE_F] == 0.0 or m.memory[STEP] == 0.0:
