@@ -52,7 +52,8 @@ def give_up(system: System, settings: Settings, method: Any) -> NoReturn:
         raise SolverError(
             f"at time {memory[scheme.TIME]:.9g} a position or velocity jumps that joints and motions "
             f"give, by {memory[scheme.LAST_ERROR]:.3g} times what a step's error may be: no step "
-            f"goes on; at {', '.join(where) or 'no single element'}. Results up to there are kept."
+            f"goes on; at {', '.join(where) or 'no single element'}. "
+            "Results up to there are kept."
         )
     raise SolverError(
         f"the step fell to {memory[scheme.STEP]:.3g} at time {memory[scheme.TIME]:.9g} "
