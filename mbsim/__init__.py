@@ -1,7 +1,7 @@
 """mbsim: multibody contact simulation from MotionSolve-style decks.
 
-The public API, in whole: `read_model`, `simulate`, `open`, `open_results`, `MbsimError`; for
-users' scripts `espy`.
+The public API, in whole: `Model`, `read_model`, `simulate`, `open`, `open_results`,
+`MbsimError`; for users' scripts `espy`.
 Names are imported at their first use, so that ``import mbsim`` costs nothing.
 """
 
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from mbsim.errors import MbsimError
     from mbsim.plugins.helpers import espy
+    from mbsim.reader.builder import Model
     from mbsim.reader.xml import read_model
     from mbsim.results.reading import open_results
     from mbsim.run.simulation import simulate
@@ -19,11 +20,21 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-__all__ = ["MbsimError", "__version__", "espy", "open", "open_results", "read_model", "simulate"]
+__all__ = [
+    "MbsimError",
+    "Model",
+    "__version__",
+    "espy",
+    "open",
+    "open_results",
+    "read_model",
+    "simulate",
+]
 
 #: Module and name there of every public name.
 _HOMES = {
     "MbsimError": ("mbsim.errors", "MbsimError"),
+    "Model": ("mbsim.reader.builder", "Model"),
     "espy": ("mbsim.plugins.helpers", "espy"),
     "open": ("mbsim.run.stepping", "open_model"),
     "open_results": ("mbsim.results.reading", "open_results"),

@@ -111,6 +111,7 @@ class _Found(NamedTuple):
 def _look(model: str, overrides: tuple[str, ...]) -> _Found:
     """Return what is said of a deck; raise `MbsimError` where it cannot be run."""
     from mbsim.compile_model.acting import check_expressions
+    from mbsim.compile_model.advice import advice as of_contacts
     from mbsim.compile_model.pairing import plan_pairs, why_costly
     from mbsim.model.names import is_adams
     from mbsim.plugins import check_libraries
@@ -136,6 +137,7 @@ def _look(model: str, overrides: tuple[str, ...]) -> _Found:
         for (id, why), count in costly.items()
         if why
     ]
+    said += of_contacts(deck)
     said += _meshes(deck)
     said += [
         (element, "its subroutine names no file; a run needs --plugin FILE.py")

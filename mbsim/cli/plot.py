@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from mbsim.cli.completion import signal_names
 from mbsim.cli.messages import echo
 from mbsim.cli.options import json_option
 
@@ -23,7 +24,13 @@ _LONGEST = 100
 
 
 @click.command("plot")
-@click.argument("arguments", nargs=-1, required=True, metavar="RESULT.h5... NAME...")
+@click.argument(
+    "arguments",
+    nargs=-1,
+    required=True,
+    metavar="RESULT.h5... NAME...",
+    shell_complete=signal_names,
+)
 @click.option(
     "-o",
     "output",

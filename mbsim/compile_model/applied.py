@@ -28,6 +28,7 @@ from mbsim.forces.catalog import (
     Wrench,
 )
 from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
+from mbsim.laws.constants import friction_parameters, normal_constants
 from mbsim.model.elements import MarkerForce, Model
 
 Array = np.ndarray[Any, Any]
@@ -118,12 +119,12 @@ def _law(kind: ForceKind, element: Any) -> tuple[int, Array]:
         from mbsim.laws import abi  # what only a run needs
 
         normal = NORMAL_LAWS[name]
-        return abi.normal_address(normal), abi.normal_constants(normal, element)
+        return abi.normal_address(normal), normal_constants(normal, element)
     if isinstance(kind.form, OfReactions) and name in FRICTION_LAWS:
         from mbsim.laws import abi
 
         friction = FRICTION_LAWS[name]
-        return abi.friction_address(friction), abi.friction_parameters(friction, element)
+        return abi.friction_address(friction), friction_parameters(friction, element)
     return 0, _NONE
 
 

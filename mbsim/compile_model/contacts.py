@@ -27,6 +27,7 @@ from mbsim.core.layout import BODY_SIZE
 from mbsim.geometry.catalog import NEARS, PAIRS, REGION_ROWS, REGIONS, SIZE, Pair
 from mbsim.laws import abi
 from mbsim.laws.catalog import NORMAL_LAWS, friction_law_of
+from mbsim.laws.constants import friction_parameters, normal_constants
 from mbsim.model.contact_radius import with_radii
 from mbsim.model.elements import Contact, Model
 from mbsim.model.placement import Placement
@@ -283,7 +284,7 @@ def contacts_table(
             normal.append((own.address, own.row))
         else:
             law = NORMAL_LAWS[contact.cnf_type]
-            normal.append((abi.normal_address(law), abi.normal_constants(law, contact)))
+            normal.append((abi.normal_address(law), normal_constants(law, contact)))
         if contact.cff_type == "USERCFF":
             friction.append(user[contact.id].row)
             addresses.append(user[contact.id].address)
@@ -293,7 +294,7 @@ def contacts_table(
             addresses.append(0)
         else:
             friction_law = friction_law_of(contact)
-            friction.append(abi.friction_parameters(friction_law, contact))
+            friction.append(friction_parameters(friction_law, contact))
             addresses.append(abi.friction_address(friction_law))
             uses_x[k], memory[k] = friction_law.uses_x, friction_law.memory
             carried[k] = friction_law.carried

@@ -64,13 +64,10 @@ from mbsim.integrators.scheme import (
     failure_or,
     in_workspace,
 )
+from mbsim.integrators.stability import BOUND, WITHIN
 
 #: Of `serve`: context, `attempt` of the explicit method, end of the run.
 ASKED = types.int64(types.int64, types.int64, types.float64)
-#: From here on a step is at the stability bound; as long as this it stays within.
-BOUND, WITHIN = 1.6, 1.8
-#: A step below this error, over the allowed one, moves nothing that the rate could be of.
-NOTHING = 1e-10
 #: A step that is shorter than this part of one that was stiff is for what that has thrown.
 THROWS = 0.1
 #: Steps found stiff one after the other from which on none goes beyond the bound: a kink is one.
@@ -112,16 +109,6 @@ def is_bounded(m: Method) -> bool:
     method may begin soon: from what flies about it takes long.
     """
     return m.memory[BOUNDED] == 1.0 or m.memory[STIFF_STEPS] >= STEADY
-
-
-@jitable
-def stay_within(m: Method, h: float, error: float) -> None:
-    """Let the step after one of length h and this error end within the bound of stability.
-
-    A step is no more than halved, for a kink looks like a high rate.
-    """
-    if m.memory[STIFFNESS] > 0.0 and error > NOTHING:
-        m.memory[STEP] = min(m.memory[STEP], max(0.5, WITHIN / m.memory[STIFFNESS]) * h)
 
 
 @jitable

@@ -19,11 +19,15 @@ import numpy as np
 from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1, F2, Pointer
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import POSITION, VELOCITY, Problem
+from mbsim.core.problem import POSITION, RATES, STATE, VELOCITY, Problem
+from mbsim.integrators.dopri5 import rate_between
+from mbsim.integrators.positions import has_positions
 from mbsim.integrators.scheme import (
     EVALUATIONS,
+    KEEPS_TO_BOUND,
     LAST_ERROR,
     SHOWN,
+    STIFFNESS,
     THIRD_AT,
     TOL,
     Method,
@@ -52,6 +56,8 @@ C = np.array((
     0.6512820512820513, 0.6, 0.8571428571428571, 1.0,
     1.0, 0.1, 0.2, 0.7777777777777778,
 ))
+#: Of k: the first row behind the stages, which hold differences between them.
+DIFFERENCES = 17
 #: Stages 2..12; row 12 is the solution of order 8, row 13..15 stages of the dense output alone.
 A = _table(
     16,
@@ -230,7 +236,38 @@ def attempt(p: Problem, m: Method, t: float, h: float) -> int:
     if not m.memory[LAST_ERROR] <= 1.0:
         return 0
     m.counts[EVALUATIONS] += 1
-    return call_int(p.rhs, (p.context, t + h, h, m.trial, m.k[12]))
+    code = call_int(p.rhs, (p.context, t + h, h, m.trial, m.k[12]))
+    if code == 0 and m.memory[KEEPS_TO_BOUND] == 1.0:
+        m.memory[STIFFNESS] = stiffness(p, m, t, h)
+    return code
+
+
+@jitable
+def stiffness(p: Problem, m: Method, t: float, h: float) -> float:
+    """Return the step times the rate of f between its last stages, in the measure of DOPRI5.
+
+    See `dopri5.stiffness`: here, too, the last two stages are at the same time. For f = -r y
+    stability ends at h r = 6.1 instead of 3.3.
+    """
+    k, n = m.k, len(m.y)
+    d, first = k[DIFFERENCES:], not has_positions(m)
+    for j in range(RATES):
+        for i in range(n):
+            d[j, i] = 0.0
+    for i in range(n):
+        if m.kinds[i] == STATE and not first:
+            continue
+        shift, come = 0.0, 0.0
+        for s in range(12):
+            shift += (A[12, s] - A[11, s]) * k[s, i]
+            come += (A[11, s] - A[10, s]) * k[s, i]
+        is_rate = m.kinds[i] != POSITION
+        j = 1 if is_rate else 0
+        d[j, i], d[3 + j, i] = h * shift, h * come
+        if is_rate:
+            d[2, i], d[5, i] = k[12, i] - k[11, i], k[11, i] - k[10, i]
+            d[6, i] = k[12, i] - k[0, i]
+    return (3.3 / 6.1) * rate_between(p, m, t, h, d)
 
 
 @jitable
@@ -308,4 +345,14 @@ def _fit_dense(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
 
 # stages and a row for the defect; kept: sizes of errors of order 3 over h^4, of the step tried
 # last and of the two that were taken before
-SCHEME = Scheme(_attempt, _fit_dense, stages=17, last=12, dense=8, order=8.0, memory=0.2, carried=3)
+SCHEME = Scheme(
+    _attempt,
+    _fit_dense,
+    stages=17,
+    last=12,
+    dense=8,
+    order=8.0,
+    memory=0.2,
+    carried=3,
+    watched=DIFFERENCES + RATES,
+)

@@ -11,12 +11,13 @@ from __future__ import annotations
 import math
 
 from mbsim.core.address import call_float, call_int
-from mbsim.core.arrays import Pointer
+from mbsim.core.arrays import F2, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import EACH, POSITION, RATES, STATE, Problem
 from mbsim.integrators.positions import has_positions
 from mbsim.integrators.scheme import (
     EVALUATIONS,
+    KEEPS_TO_BOUND,
     LAST_ERROR,
     OWN_TIME,
     STIFFNESS,
@@ -101,7 +102,7 @@ def attempt(p: Problem, m: Method, t: float, h: float) -> int:
             E1 * k[0, i] + E3 * k[2, i] + E4 * k[3, i] + E5 * k[4, i] + E6 * k[5, i] + E7 * k[6, i]
         )
     m.memory[LAST_ERROR] = call_float(p.norm, (p.context, t, h, m.error, w)) / m.memory[TOL]
-    if m.memory[WATCH] == 1.0:
+    if m.memory[WATCH] == 1.0 or m.memory[KEEPS_TO_BOUND] == 1.0:
         m.memory[STIFFNESS] = stiffness(p, m, t, h)
     return 0
 
@@ -161,8 +162,17 @@ def stiffness(p: Problem, m: Method, t: float, h: float) -> float:
     near the bound of stability at 3.3. An error that is far below what is allowed bounds no step.
     """
     fill_differences(m, h)
+    return rate_between(p, m, t, h, m.k[DIFFERENCES:])
+
+
+@jitable
+def rate_between(p: Problem, m: Method, t: float, h: float, size: F2) -> float:
+    """Return h times the larger rate of two pairs of stages, inf where it is hidden.
+
+    `size` has, in its rows, shifts, changes of velocity and of f of either pair, and the change of
+    f over the step.
+    """
     # in the norm of the error, which has no units
-    size = m.k[DIFFERENCES:]
     call_float(p.norm, (p.context, t, EACH, size[0], m.y))
     rate, own = 0.0, m.memory[OWN_TIME]
     for j in (0, 3):

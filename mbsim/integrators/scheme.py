@@ -96,7 +96,12 @@ THIRD_AT = 54
 LOOKS, LOAD_THEN, SWITCHED, REACH = range(55, 59)
 # the most that the error of a step of order 2 may be, whatever tol is
 HELD = 59
-MEMORY = 60
+# of an explicit method alone (`stability.py`): whether it looks at its bound of stability, and goes
+# beyond; how far both kinds of steps go for an evaluation, 0 for unknown; of the window of steps:
+# how many, and at the bound, time and evaluations at its begin; windows since the kind was chosen
+KEEPS_TO_BOUND, FREE, PACE_FREE, PACE_WITHIN = range(62, 66)
+WINDOW_STEPS, WINDOW_STIFF, WINDOW_TIME, WINDOW_WORK, WINDOWS = range(66, 71)
+MEMORY = 71
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
@@ -121,7 +126,7 @@ class Scheme(NamedTuple):
     implicit: bool = False  # solves with the problem's linearisation
     carried: int = 0  # rows of `kept`
     pair: bool = False  # solves with complex coefficients as well
-    watched: int = 0  # rows of k where AUTO watches it
+    watched: int = 0  # rows of k where its rates are looked at
     samples: int = 1  # parts of a step of others in which it sees as much, at the ends alone
     # a step that is cut to less than this part, where a force in touch ends, tells nothing of the
     # next one, which is as long as it was meant to be
@@ -206,6 +211,11 @@ def make(scheme: Scheme, y0: Any, t0: float, kinds: Any = None, rows: int = 1) -
         np.full((rows, 2), math.inf),
         np.zeros(COEFFICIENTS),
     )
+
+
+def looked_at(scheme: Scheme) -> Scheme:
+    """Return a scheme whose arrays hold what its rates are found by."""
+    return scheme._replace(stages=max(scheme.stages, scheme.watched))
 
 
 def both(one: Scheme, other: Scheme) -> Scheme:

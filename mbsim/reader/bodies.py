@@ -216,6 +216,7 @@ BODY_RIGID = Statement(
     },
     _build_body,
     about="a rigid body, or the ground",
+    call="body",
 )
 
 _ABOUT_ANGLES = {

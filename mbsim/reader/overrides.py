@@ -9,6 +9,7 @@ from mbsim.errors import ModelError
 from mbsim.reader.keywords import fold, nearest
 from mbsim.reader.parse import Attribute, Node
 from mbsim.reader.statements import known_attributes
+from mbsim.reader.written import written
 
 _FORM = re.compile(
     r"\s*(\w+)\s*(?:\[\s*([^\]]*?)\s*\])?(?:\[\s*([1-9]\d*)\s*\])?\s*\.\s*(\w+)\s*=(.*)", re.DOTALL
@@ -28,17 +29,7 @@ def as_texts(overrides: Mapping[str, object] | Sequence[str]) -> tuple[str, ...]
         if isinstance(overrides, str):
             raise ModelError(f"overrides={overrides!r}: must be a list of texts, or a dict")
         return tuple(overrides)
-    return tuple(f"{name}={_written(value)}" for name, value in overrides.items())
-
-
-def _written(value: object) -> str:
-    """Return a value as a deck has it."""
-    if isinstance(value, bool):
-        return "TRUE" if value else "FALSE"
-    if isinstance(value, (list, tuple)):
-        return " ".join(map(_written, value))
-    item = getattr(value, "item", None)  # of NumPy's numbers
-    return _written(item()) if item is not None else str(value)
+    return tuple(f"{name}={written(value)}" for name, value in overrides.items())
 
 
 def apply_overrides(

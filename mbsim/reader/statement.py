@@ -68,7 +68,8 @@ class Statement:
 
     `build` gets the parsed attributes and adds an element to the draft. `any_attribute`
     tells of a node whose attributes are not looked at, because nothing in it can matter. `text`
-    is the attribute that may be given as the element's text as well. `about` says what it is.
+    is the attribute that may be given as the element's text as well. `about` says what it is,
+    `call` what a `mbsim.Model` calls it where that is not its name without the first word.
     """
 
     name: str
@@ -81,6 +82,7 @@ class Statement:
     any_attribute: Callable[[Node], bool] = _needs_no_names
     text: str = ""
     about: str = ""
+    call: str = ""
 
     @cached_property
     def spec_names(self) -> dict[str, str]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from typing import IO
+from typing import IO, TYPE_CHECKING, TypeAlias, cast
 
 from mbsim.core.collection import no_collection
 from mbsim.core.stored import read_regular
@@ -23,16 +23,20 @@ from mbsim.reader.parse import MAX_BYTES, Node, parse
 from mbsim.reader.points import hold_points
 from mbsim.reader.statements import read_section
 
+if TYPE_CHECKING:
+    from mbsim.reader.builder import Model as Builder
+
 _COMPATIBILITY = "MOTIONSOLVE"
 _SECTIONS = ("model", "command")
-
+#: What a deck may be given as.
+Given: TypeAlias = "str | PathLike[str] | IO[str] | IO[bytes] | Builder"
 
 #: What a deck is called that is no file; the files that it names are looked for from here.
 _NO_FILE = "deck.xml"
 
 
 def as_model(
-    model: el.Model | str | PathLike[str] | IO[str] | IO[bytes],
+    model: el.Model | Given,
     overrides: Mapping[str, object] | Sequence[str] = (),
 ) -> el.Model:
     """Return a model as it is, or read; overrides are for one that is not read yet."""
@@ -45,7 +49,7 @@ def as_model(
 
 @no_collection()
 def read_model(
-    path: str | PathLike[str] | IO[str] | IO[bytes],
+    path: Given,
     overrides: Mapping[str, object] | Sequence[str] = (),
 ) -> el.Model:
     """Return the model that a deck describes, with everything about it checked.
@@ -55,8 +59,8 @@ def read_model(
     path : path-like, text or file
         The deck: an Adams deck where it ends in .adm, an Adams command file with its deck where
         it ends in .acf, else an XML file with <Model> and <Command> parts under any root. A text
-        that begins with ``<`` is the XML itself, and something with `read` is read; files that it
-        names are looked for in the current folder.
+        that begins with ``<`` is the XML itself, and something with `read` is read, a `mbsim.Model`
+        too; files that it names are looked for in the current folder.
     overrides : mapping or sequence of str, optional
         ``{"Element[id].attribute": value}`` or ``["Element[id].attribute=value"]``, set in the
         deck before it is read.
@@ -74,7 +78,17 @@ def read_model(
     ModelError
         If the file cannot be read, or an override names what is not there.
     """
-    texts = as_texts(overrides)
+    try:
+        return _read(path, as_texts(overrides))
+    except DeckError as error:
+        placed = getattr(path, "placed", None)
+        if placed is None:
+            raise
+        raise DeckError([placed(fault) for fault in error.faults]) from None
+
+
+def _read(path: Given, texts: tuple[str, ...]) -> el.Model:
+    """Return the model of a deck; overrides as texts."""
     name, data = _given(path)
     deck = Path(name)
     draft, said_so = _read_draft(name, data, texts)
@@ -168,12 +182,13 @@ def _fill(data: bytes, draft: Draft, overrides: Sequence[str]) -> None:
         draft.fault(root.line, root.tag, "no <Model> in the deck: there is nothing to simulate")
 
 
-def _given(path: str | PathLike[str] | IO[str] | IO[bytes]) -> tuple[str | PathLike[str], bytes]:
+def _given(path: Given) -> tuple[str | PathLike[str], bytes]:
     """Return what a deck is called, and its bytes."""
     if isinstance(path, str) and path.lstrip().startswith("<"):
         return _NO_FILE, path.encode("utf-8")
     if isinstance(path, (str, PathLike)):
-        return path, _read_bytes(Path(path))
+        file = cast("str | PathLike[str]", path)
+        return file, _read_bytes(Path(file))
     read = getattr(path, "read", None)
     if read is None:
         raise ModelError(f"{path!r}: must be a path, XML as text, or something to read it from")
@@ -195,6 +210,18 @@ def _read_bytes(path: Path) -> bytes:
         raise ModelError(f"{path}: cannot be read: {error.strerror or error}") from None
     except ValueError as error:
         raise ModelError(f"{str(path)!r}: is no file name: {error}") from None
+
+
+def read_sections(deck: Given) -> tuple[str, list[Node]]:
+    """Return what an XML deck is called, and its <Model> and <Command> parts as they stand."""
+    name, data = _given(deck)
+    if is_adams(Path(name).name):
+        raise ModelError(f"{name}: an Adams deck; only XML can be gone on with")
+    draft = Draft(str(name), Path(name).absolute().parent)
+    sections = list(_find_sections(parse(data, draft.file), draft))
+    if draft.faults:
+        raise DeckError(draft.faults)
+    return str(name), sections
 
 
 def _find_sections(node: Node, draft: Draft) -> Iterator[Node]:

@@ -49,11 +49,11 @@ def give_up(system: System, settings: Settings, method: Any) -> NoReturn:
     elif unsolved:
         where.extend(_held_by(system, body))
     if counts[scheme.LAST_REASON] == problem.BY_JUMP:
+        now, times = memory[scheme.TIME], memory[scheme.LAST_ERROR]
         raise SolverError(
-            f"at time {memory[scheme.TIME]:.9g} a position or velocity jumps that joints and motions "
-            f"give, by {memory[scheme.LAST_ERROR]:.3g} times what a step's error may be: no step "
-            f"goes on; at {', '.join(where) or 'no single element'}. "
-            "Results up to there are kept."
+            f"at time {now:.9g} a position or velocity jumps that joints and motions give, by "
+            f"{times:.3g} times what a step's error may be: no step goes on; "
+            f"at {', '.join(where) or 'no single element'}. Results up to there are kept."
         )
     raise SolverError(
         f"the step fell to {memory[scheme.STEP]:.3g} at time {memory[scheme.TIME]:.9g} "

@@ -71,7 +71,10 @@ class Methods:
         self.explicit = catalog.load(catalog.EXPLICIT if changing else name, fixed)
         self.other = catalog.load(catalog.IMPLICIT) if changing else None
         bodies = len(system.body_ids)
-        held = scheme.both(self.explicit, self.other) if self.other else self.explicit
+        alone = self.explicit.watched > 0 and bodies <= MOST_BODIES and not changing
+        held = scheme.looked_at(self.explicit) if alone else self.explicit
+        if self.other:
+            held = scheme.both(self.explicit, self.other)
         kinds = configuration.kinds(bodies, len(system.y0))
         self.arrays = scheme.make(held, system.y0, start, kinds, ROWS if timed else 1)
         # where a contact may close or stick, Newton's iteration that fails with what held at the
@@ -110,6 +113,8 @@ class Methods:
             self.arrays.memory[scheme.PATIENCE] = FIRST_PATIENCE
             self.arrays.memory[scheme.RELUCTANCE] = 1.0
             self.arrays.memory[scheme.BEGUN] = start
+        if alone:
+            self.arrays.memory[scheme.KEEPS_TO_BOUND] = 1.0
         self.changes = 0
         #: When AUTO changed over last, and the work by then.
         self._since = (start, 0.0)

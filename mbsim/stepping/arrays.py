@@ -41,9 +41,10 @@ KEPT_POINT, KEPT_NORMAL, KEPT_TANGENT, KEPT_FORCE = 14, 17, 20, 23
 KEPT_COLUMNS = 26
 # entries of `Plan.number`: 1 where the error of steps is not estimated; lengths below which gaps
 # and changes of position do not count; what the solver may leave of a velocity, times h; 1 where
-# some kind of pair is not near; how fast positions are projected, see `solver.project_positions`
-FIXED, SLOP, LEFT, SOME_AHEAD, PUSH_SPEED = range(5)
-PLAN_NUMBERS = 5
+# some kind of pair is not near; how fast positions are projected, see `solver.project_positions`;
+# what may be left of a velocity at most, however short a step; and part of a step's jumps that may
+FIXED, SLOP, LEFT, SOME_AHEAD, PUSH_SPEED, LEFT_SPEED, LEFT_PART = range(7)
+PLAN_NUMBERS = 7
 # entries of `Tally.number`, of the last step tried: what the solver left, as a velocity; its
 # length; the contact that closed fastest in it, and by how much within its length; how far its end
 # is from that of two halves, and its middle from the state between them; when it ended, once it
@@ -116,12 +117,13 @@ class Points(NamedTuple):
     normal: F2  # (m, 3)
     tangent: F2  # (m, 3)
     H: F4  # (m, 2, 3, 6) velocity along (n, x, y) by those of the bodies
-    answer: F4  # (m, 2, 6, 3) velocities of the bodies by r, where joints hold neither
+    answer: F4  # (m, 2, 3, 6) velocities of the bodies by each of r, where joints hold neither
     wide: I1  # (m,) else first row of `moved`, -1 where they do not
     many: I1  # (m,) its rows there
     moved: I1  # (wide rows,) bodies that r moves
     moves: F3  # (wide rows, 6, 3) their velocities by r
     W: F3  # (m, 3, 3) u by r
+    stops: F3  # (m, 3, 3) its inverse, 0 where it has none
     mu: F1  # (m,)
     holds: F1  # (m,) mu as it is at the step's begin
     ahead: F1  # (m,) u_n + ahead >= 0 where the point closes
@@ -129,6 +131,7 @@ class Points(NamedTuple):
     r: F2  # (m, 3)
     old: F2  # (m, 3) r before the sweep at hand
     way: F2  # (m, 3) of the sweeps so far
+    counts: F1  # (m,) 1 over what may be left of its velocity
     push: F1  # (m,) what projected positions
 
 
@@ -207,12 +210,13 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int]) -
         normal=numbers(m, 3),
         tangent=numbers(m, 3),
         H=numbers(m, 2, 3, 6),
-        answer=numbers(m, 2, 6, 3),
+        answer=numbers(m, 2, 3, 6),
         wide=whole(m),
         many=whole(m),
         moved=whole(wide),
         moves=numbers(wide, 6, 3),
         W=numbers(m, 3, 3),
+        stops=numbers(m, 3, 3),
         mu=numbers(m),
         holds=numbers(m),
         ahead=numbers(m),
@@ -220,6 +224,7 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int]) -
         r=numbers(m, 3),
         old=numbers(m, 3),
         way=numbers(m, 3),
+        counts=numbers(m),
         push=numbers(m),
     )
     room = 1 << max(4, int(4 * m - 1).bit_length())

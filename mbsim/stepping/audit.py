@@ -40,13 +40,13 @@ from mbsim.stepping.arrays import (
     ENDED,
     FASTEST,
     FIXED,
-    LEFT,
     POINTS,
     RESIDUAL,
     ROWS_OFF,
     STEP_LENGTH,
     Stepping,
 )
+from mbsim.stepping.friction import left_of
 
 #: Rounding of friction on its cone.
 CONE_ROUNDING = 1e-12
@@ -99,7 +99,7 @@ def examine_step(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> None:
     if h == 0.0:
         return
     tally[STEPS_ALL] += 1.0
-    allowed = S.plan.number[LEFT] / number[STEP_LENGTH]
+    allowed = left_of(S, number[STEP_LENGTH])
     note(scene, UNSOLVED_IMPULSES, number[RESIDUAL], allowed, t, -1)
     examine_points(scene, S, t)
     if S.plan.number[FIXED] == 1.0 and len(scene.contacts.id) > 0:

@@ -24,6 +24,7 @@ from mbsim.laws.abi import (
     XDOT_IN,
 )
 from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
+from mbsim.laws.impact_test import impact_of
 from mbsim.model.names import element_name
 from mbsim.stepping.arrays import (
     FIRST_SPEED,
@@ -50,8 +51,6 @@ SLOWEST_ASKED, FASTEST_ASKED, ASKED = 1e-7, 1e2, 721
 SAME = 1e-6
 #: Part of the largest coefficient from which on contact slips.
 NEARLY = 1.0 - 1e-3
-#: Steps of the impact from which a damper's restitution is found, over its duration.
-STEPS = 2000
 
 
 class Coefficients:
@@ -213,11 +212,8 @@ class Coefficients:
 
 
 def rebound(system: System, contact: Contact, speed: float, mass: float) -> float:
-    """Return the rebound of a mass that meets a contact's normal law at a speed, over that.
-
-    The law alone acts: m d'' = -F(d, d') from d = 0, d' = speed, by Runge and Kutta's method.
-    """
-    from mbsim.laws.abi import normal_constants
+    """Return the rebound of a mass that meets a contact's normal law at a speed, over that."""
+    from mbsim.laws.constants import normal_constants
 
     law = NORMAL_LAWS[contact.cnf_type]
     if law.of_shapes:
@@ -225,24 +221,4 @@ def rebound(system: System, contact: Contact, speed: float, mass: float) -> floa
             f"{system.model.file}:{contact.source.line}: Force_Contact[{contact.id}]: give "
             "restitution_coef and ref_velocity for integrator MOREAU"
         )
-    constants = tuple(normal_constants(law, contact).tolist())
-
-    def slope(d: float, v: float) -> tuple[float, float]:
-        return v, -law.law(d, v, *constants)[0] / mass
-
-    # the time in which an elastic force would stop it
-    depth = speed * 1e-6
-    while law.law(depth, 0.0, *constants)[2] < 0.5 * mass * speed * speed and depth < 1e9 * speed:
-        depth *= 1.5
-    h = 2.0 * depth / speed / STEPS
-    d, v = 0.0, speed
-    for _ in range(100 * STEPS):
-        a1, b1 = slope(d, v)
-        a2, b2 = slope(d + 0.5 * h * a1, v + 0.5 * h * b1)
-        a3, b3 = slope(d + 0.5 * h * a2, v + 0.5 * h * b2)
-        a4, b4 = slope(d + h * a3, v + h * b3)
-        d += h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
-        v += h / 6.0 * (b1 + 2.0 * b2 + 2.0 * b3 + b4)
-        if d <= 0.0:
-            return max(0.0, min(1.0, -v / speed))
-    return 0.0
+    return impact_of(law, tuple(normal_constants(law, contact).tolist()), speed, mass).rebound

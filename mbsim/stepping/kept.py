@@ -49,10 +49,18 @@ def place_of(key: int, room: int) -> int:
 
 
 @jitable
+def room_of(S: Stepping) -> int:
+    """Return how many places of the table of keys are in use: it is cleared at every step."""
+    room = 16
+    while room < 4 * S.kept.count[0]:
+        room *= 2
+    return room
+
+
+@jitable
 def index_kept(S: Stepping) -> None:
     """Fill the table by which the kept points of a pair are found."""
-    kept = S.kept
-    room = len(kept.table_of_keys)
+    kept, room = S.kept, room_of(S)
     for at in range(room):
         kept.table_of_keys[at] = 0
     for row in range(kept.count[0]):
@@ -67,8 +75,7 @@ def index_kept(S: Stepping) -> None:
 @jitable
 def first_kept(S: Stepping, key: int) -> int:
     """Return the first row of a pair's kept points, their number for none."""
-    kept = S.kept
-    room = len(kept.table_of_keys)
+    kept, room = S.kept, room_of(S)
     at = place_of(key, room)
     while kept.table_of_keys[at] != 0:
         row = kept.table_of_keys[at] - 1

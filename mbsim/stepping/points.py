@@ -7,9 +7,9 @@ import math
 from mbsim.arrays.hooks import Hook, Joints, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
-from mbsim.core.arrays import F1, V3
+from mbsim.core.arrays import F1, F3, V3
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import any_tangent, cross, norm, vector
+from mbsim.core.rotation import any_tangent, cross, dot, norm, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.forces import IGNORE_DEEPER, sides
 from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT
@@ -19,6 +19,8 @@ from mbsim.stepping.arrays import POINTS, Stepping
 AHEAD = 0.5
 #: Weights below this are no point.
 LEAST = 1e-6
+#: A determinant is none below this part of the product of a matrix' diagonal.
+SINGULAR = 1e-12
 
 
 @jitable
@@ -122,7 +124,7 @@ def put_side(scene: Scene, S: Stepping, k: int, side: int, axes: tuple[V3, V3, V
     if b == len(scene.bodies.mass):
         for a in range(3):
             for c in range(6):
-                H[a, c] = answer[c, a] = 0.0
+                H[a, c] = answer[a, c] = 0.0
         return
     arm = vector(P.arm[k, side])
     for a in range(3):
@@ -131,11 +133,12 @@ def put_side(scene: Scene, S: Stepping, k: int, side: int, axes: tuple[V3, V3, V
             H[a, c], H[a, 3 + c] = axes[a][c], turn[c]
     inverse = S.motion.inverse[b]
     for a in range(3):
-        for c in range(6):
+        for c in range(3):
+            answer[a, c] = inverse[c, c] * H[a, c]
             total = 0.0
-            for d in range(6):
-                total += inverse[c, d] * H[a, d]
-            answer[c, a] = total
+            for d in range(3, 6):
+                total += inverse[3 + c, d] * H[a, d]
+            answer[a, 3 + c] = total
 
 
 @jitable
@@ -199,15 +202,27 @@ def widen(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
             side = 0 if b == P.body[k, 0] else 1
             for c in range(6):
                 held = plan.group[b] >= 0
-                P.moves[row, c, a] = impulse[6 * b + c] if held else P.answer[k, side, c, a]
+                P.moves[row, c, a] = impulse[6 * b + c] if held else P.answer[k, side, a, c]
     # what its own bodies do
     for row in range(begin, begin + P.many[k]):
         for side in range(2):
             if P.moved[row] == P.body[k, side]:
                 for c in range(6):
                     for a in range(3):
-                        P.answer[k, side, c, a] = P.moves[row, c, a]
+                        P.answer[k, side, a, c] = P.moves[row, c, a]
     return True
+
+
+@jitable
+def invert(A: F3, out: F3, k: int) -> None:
+    """Write the inverse of the 3 x 3 matrix A[k], 0 where it has none to speak of."""
+    a, b, c = vector(A[k, 0]), vector(A[k, 1]), vector(A[k, 2])
+    x, y, z = cross(b, c), cross(c, a), cross(a, b)
+    determinant = dot(a, x)
+    some = determinant > SINGULAR * A[k, 0, 0] * A[k, 1, 1] * A[k, 2, 2]
+    part = 1.0 / determinant if some else 0.0
+    for row in range(3):
+        out[k, row, 0], out[k, row, 1], out[k, row, 2] = part * x[row], part * y[row], part * z[row]
 
 
 @jitable
@@ -234,9 +249,10 @@ def fill_point(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
         for c in range(3):
             total = 0.0
             for d in range(6):
-                total += P.H[k, 0, a, d] * P.answer[k, 0, d, c]
-                total += P.H[k, 1, a, d] * P.answer[k, 1, d, c]
+                total += P.H[k, 0, a, d] * P.answer[k, 0, c, d]
+                total += P.H[k, 1, a, d] * P.answer[k, 1, c, d]
             P.W[k, a, c] = total
+    invert(P.W, P.stops, k)
     u = 0.0
     for d in range(6):
         u += P.H[k, 0, 0, d] * M.before[i, d] + P.H[k, 1, 0, d] * M.before[j, d]

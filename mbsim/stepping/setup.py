@@ -20,6 +20,8 @@ from mbsim.stepping.arrays import (
     ALL_SWEEPS,
     FIXED,
     LEFT,
+    LEFT_PART,
+    LEFT_SPEED,
     NEWTONS,
     PLAN_NUMBERS,
     PROJECTED,
@@ -81,6 +83,8 @@ MOST_WIDE = 200_000
 #: A gap, or what a position changes by, counts from this part of tol L on; what the solver may
 #: leave of a velocity is that part of tol L / h.
 COUNTS, LEAVES = 0.1, 3e-3
+#: Part of what an impact changes of a velocity that the solver may leave, over tol, and at most.
+JUMPS, MOST_JUMPS = 10.0, 0.05
 
 
 class Made(NamedTuple):
@@ -123,6 +127,8 @@ def _plan(system: System, fixed: bool, tol: float) -> Plan:
     group, members, first = _groups(system)
     number[SOME_AHEAD] = float(not near.all())
     number[PUSH_SPEED] = float(scene.world.scale[SCALE_SPEED])
+    number[LEFT_SPEED] = tol * number[PUSH_SPEED]
+    number[LEFT_PART] = min(JUMPS * tol, MOST_JUMPS)
     number[SLOP], number[LEFT] = COUNTS * tol * length, LEAVES * tol * length
     return Plan(number, near, rows, group, members, first)
 

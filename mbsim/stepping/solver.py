@@ -26,6 +26,12 @@ from mbsim.stepping.arrays import Motion, Points
 
 #: Sweeps before Newton's method, and behind it, at most.
 FEW_SWEEPS, MOST_SWEEPS = 40, 400
+#: Sweeps between looks at how much the bodies' velocities change in the step.
+LOOKS = 8
+#: What impacts may leave at most, over what the solver may leave where nothing meets.
+MOST_LEFT = 10.0
+#: How often the points of a pair are solved in one sweep at most.
+MOST_ROUNDS = 5
 #: Points up to which Newton's method finishes: of large piles a step's factors cost more than
 #: sweeps bring, and warm starts go on from step to step.
 NEWTON_POINTS = 300
@@ -36,10 +42,12 @@ NEWTONS, SHARPEST = 40, 1e-13
 @jitable
 def velocity_of(H: F4, k: int, a: int, v: F2, i: int, j: int) -> float:
     """Return component a of u at point k."""
-    u = 0.0
-    for c in range(6):
-        u += H[k, 0, a, c] * v[i, c] + H[k, 1, a, c] * v[j, c]
-    return u
+    # four sums that do not wait for each other
+    x = H[k, 0, a, 0] * v[i, 0] + H[k, 0, a, 1] * v[i, 1] + H[k, 0, a, 2] * v[i, 2]
+    y = H[k, 0, a, 3] * v[i, 3] + H[k, 0, a, 4] * v[i, 4] + H[k, 0, a, 5] * v[i, 5]
+    z = H[k, 1, a, 0] * v[j, 0] + H[k, 1, a, 1] * v[j, 1] + H[k, 1, a, 2] * v[j, 2]
+    w = H[k, 1, a, 3] * v[j, 3] + H[k, 1, a, 4] * v[j, 4] + H[k, 1, a, 5] * v[j, 5]
+    return (x + y) + (z + w)
 
 
 @jitable
@@ -53,8 +61,9 @@ def apply(p: Points, k: int, v: F2, r: V3) -> None:
         return
     i, j, answer = p.body[k, 0], p.body[k, 1], p.answer
     for c in range(6):
-        v[i, c] += answer[k, 0, c, 0] * r[0] + answer[k, 0, c, 1] * r[1] + answer[k, 0, c, 2] * r[2]
-        v[j, c] += answer[k, 1, c, 0] * r[0] + answer[k, 1, c, 1] * r[1] + answer[k, 1, c, 2] * r[2]
+        v[i, c] += answer[k, 0, 0, c] * r[0] + answer[k, 0, 1, c] * r[1] + answer[k, 0, 2, c] * r[2]
+    for c in range(6):
+        v[j, c] += answer[k, 1, 0, c] * r[0] + answer[k, 1, 1, c] * r[1] + answer[k, 1, 2, c] * r[2]
 
 
 @jitable
@@ -67,7 +76,17 @@ def solve_point(p: Points, v: F2, k: int) -> float:
     if un >= 0.0 and rn == 0.0 and rx == 0.0 and ry == 0.0:
         return 0.0
     ux, uy = velocity_of(H, k, 1, v, i, j), velocity_of(H, k, 2, v, i, j)
+    # what brings it to rest: r - W^-1 u
+    sn = rn - (p.stops[k, 0, 0] * un + p.stops[k, 0, 1] * ux + p.stops[k, 0, 2] * uy)
+    sx = rx - (p.stops[k, 1, 0] * un + p.stops[k, 1, 1] * ux + p.stops[k, 1, 2] * uy)
+    sy = ry - (p.stops[k, 2, 0] * un + p.stops[k, 2, 1] * ux + p.stops[k, 2, 2] * uy)
+    most = p.mu[k] * sn
     bn = un - (W[k, 0, 0] * rn + W[k, 0, 1] * rx + W[k, 0, 2] * ry)
+    if bn < 0.0 and sn >= 0.0 and sx * sx + sy * sy <= most * most and p.stops[k, 0, 0] > 0.0:
+        dn, dx, dy = sn - rn, sx - rx, sy - ry
+        r[k, 0], r[k, 1], r[k, 2] = sn, sx, sy
+        apply(p, k, v, (dn, dx, dy))
+        return max(W[k, 0, 0] * abs(dn), max(W[k, 1, 1] * abs(dx), W[k, 2, 2] * abs(dy)))
     bx = ux - (W[k, 1, 0] * rn + W[k, 1, 1] * rx + W[k, 1, 2] * ry)
     by = uy - (W[k, 2, 0] * rn + W[k, 2, 1] * rx + W[k, 2, 2] * ry)
     sn, sx, sy = contact_3d(W, k, bn, bx, by, p.mu[k], rn, rx, ry)
@@ -80,15 +99,55 @@ def solve_point(p: Points, v: F2, k: int) -> float:
 
 
 @jitable
-def sweep(p: Points, v: F2, count: int, backward: bool) -> float:
-    """Go once through the points; return the largest change of a velocity."""
+def solve_pair(p: Points, v: F2, begin: int, end: int) -> float:
+    """Solve points of one pair in turn; return the largest change over what may be left."""
     largest = 0.0
-    for step in range(count):
-        k = count - 1 - step if backward else step
-        change = solve_point(p, v, k)
+    for k in range(begin, end):
+        change = solve_point(p, v, k) * p.counts[k]
         if not change <= largest:
             largest = change
     return largest
+
+
+@jitable
+def sweep(p: Points, v: F2, count: int) -> float:
+    """Go once through the pairs; return the largest change of a velocity over what may be left.
+
+    Points of one pair are solved a few times in turn: they bear on each other most, as corners of
+    a face do.
+    """
+    largest, begin = 0.0, 0
+    while begin < count:
+        end = begin + 1
+        while end < count and p.key[end] == p.key[begin]:
+            end += 1
+        first = solve_pair(p, v, begin, end)
+        if not first <= largest:
+            largest = first
+        rounds, left = 1, first
+        while end > begin + 1 and 1.0 < left < math.inf and rounds < MOST_ROUNDS:
+            left = solve_pair(p, v, begin, end)
+            rounds += 1
+        begin = end
+    return largest
+
+
+@jitable
+def let_jumps_count(p: Points, M: Motion, count: int, allowed: float, part: float) -> None:
+    """Let that part of what a step changes of a body's velocity be left at its points.
+
+    Never less than `allowed`, nor more than MOST_LEFT times that. An impact is taken by the step,
+    which is off by far more.
+    """
+    for k in range(count):
+        i, j = p.body[k, 0], p.body[k, 1]
+        most = 0.0
+        for b in (i, j):
+            square = 0.0
+            for c in range(3):
+                square += (M.v[b, c] - M.before[b, c]) ** 2
+            most = max(most, square)
+        p.counts[k] = 1.0 / min(max(allowed, part * math.sqrt(most)), MOST_LEFT * allowed)
 
 
 @jitable
@@ -119,23 +178,29 @@ def go_on(p: Points, v: F2, count: int, part: float) -> None:
 
 
 @jitable
-def sweep_on(p: Points, v: F2, count: int, allowed: float, most: int) -> tuple[float, int]:
-    """Improve r and v of `count` points; return what a sweep still changes of a velocity, sweeps.
+def sweep_on(
+    p: Points, M: Motion, count: int, allowed: tuple[float, float], most: int
+) -> tuple[float, int]:
+    """Improve r and v of `count` points; return what a sweep still changes, sweeps.
 
-    Sweeps end where a velocity changes by less than `allowed`, or with `most`. Between them
+    That is of a velocity, over what may be left of it: `allowed` and a part of jumps. Sweeps end
+    where it is less than 1, or with `most`. Between them
     impulses go on along the way of the sweeps before, as conjugate gradients do, which is dropped
     where a sweep changes more than the last one.
     Source: M. Silcowitz, S. Niebe, K. Erleben, A nonsmooth nonlinear conjugate gradient method for
     interactive contact force problems, The Visual Computer 26 (2010) 893.
     """
-    left, before, sweeps = 0.0, 0.0, 0
+    left, before, sweeps, v = 0.0, 0.0, 0, M.v
     for k in range(count):
+        p.counts[k] = 1.0 / allowed[0]
         for a in range(3):
             p.old[k, a] = p.r[k, a]
     while sweeps < most:
-        left = sweep(p, v, count, False)
+        left = sweep(p, v, count)
         sweeps += 1
-        if left <= allowed or sweeps == most or not math.isfinite(left):
+        if sweeps % LOOKS == 1 and left > 1.0:
+            let_jumps_count(p, M, count, allowed[0], allowed[1])
+        if left <= 1.0 or sweeps == most or not math.isfinite(left):
             break
         square = gradient(p, count)
         part = -1.0
@@ -199,26 +264,26 @@ def some_wide(p: Points, count: int) -> bool:
 
 @jitable
 def solve_points(
-    p: Points, M: Motion, ground: int, count: int, allowed: float
+    p: Points, M: Motion, ground: int, count: int, allowed: tuple[float, float]
 ) -> tuple[float, int, int]:
-    """Solve `count` points; return what a sweep still changes of a velocity, sweeps and Newtons.
+    """Solve `count` points; return what a sweep still changes, sweeps and Newtons: `sweep_on`.
 
     r and v are as a guess says: r of the last step, v with that. A few sweeps do where little
     changed; Newton's method does what they leave, and sweeps what it leaves.
     """
-    left, sweeps = sweep_on(p, M.v, count, allowed, FEW_SWEEPS)
-    if left <= allowed:
+    left, sweeps = sweep_on(p, M, count, allowed, FEW_SWEEPS)
+    if left <= 1.0:
         return left, sweeps, 0
     newtons = 0
     if not math.isfinite(left):
         begin_anew(p, M, count)
     elif count <= NEWTON_POINTS and not some_wide(p, count):
-        newtons = finish(p, M, ground, count, allowed)
-    left, more = sweep_on(p, M.v, count, allowed, MOST_SWEEPS)
+        newtons = finish(p, M, ground, count, allowed[0])
+    left, more = sweep_on(p, M, count, allowed, MOST_SWEEPS)
     if not math.isfinite(left):
         begin_anew(p, M, count)
         for _ in range(FEW_SWEEPS):
-            left = sweep(p, M.v, count, False)
+            left = sweep(p, M.v, count)
     return left, sweeps + more, newtons
 
 

@@ -43,8 +43,9 @@ from mbsim.stepping.arrays import (
     ALL_POINTS,
     ALL_STEPS,
     ALL_SWEEPS,
+    FIXED,
     KEPT_STICKS,
-    LEFT,
+    LEFT_PART,
     NEWTONS,
     POINTS,
     PRESSING,
@@ -58,7 +59,7 @@ from mbsim.stepping.arrays import (
     UNSOLVED,
     Stepping,
 )
-from mbsim.stepping.friction import NOISE, coefficient, keep_loads, let_yield
+from mbsim.stepping.friction import NOISE, coefficient, keep_loads, left_of, let_yield
 from mbsim.stepping.kept import index_kept, recall
 from mbsim.stepping.pairs import find_missed, find_points
 from mbsim.stepping.points import fill_point, fill_reach, way_at
@@ -211,6 +212,9 @@ def look_ahead(S: Stepping, k: int, h: float) -> float:
     """
     P, M, rule = S.points, S.motion, S.rules.number[S.points.contact[k]]
     gap, before = P.gap[k], P.closing[k]
+    if P.was[k] >= 0 and 0.0 < gap <= S.plan.number[SLOP]:
+        # it lies on: to follow what does not count would keep all that rests in motion
+        gap = 0.0
     free = velocity_of(P.H, k, 0, M.free, P.body[k, 0], P.body[k, 1])
     mean = 0.5 * (before + free)
     P.ahead[k] = max(gap, 0.0) / h
@@ -218,7 +222,7 @@ def look_ahead(S: Stepping, k: int, h: float) -> float:
         # it does not close by itself
         P.ahead[k] = max(P.ahead[k], -free)
         return NO_IMPACT
-    if rule[RESTITUTION] == 0.0 or before >= -max(rule[SLOWEST], NOISE * S.plan.number[LEFT] / h):
+    if rule[RESTITUTION] == 0.0 or before >= -max(rule[SLOWEST], NOISE * left_of(S, h)):
         return NO_IMPACT
     part = min(max(gap, 0.0) / (h * -mean), 1.0)
     comes = before + part * (free - before)
@@ -243,8 +247,8 @@ def prepare_points(scene: Scene, S: Stepping, h: float) -> int:
     for k in range(count):
         i, j = P.body[k, 0], P.body[k, 1]
         x, z = velocity_of(P.H, k, 1, M.before, i, j), velocity_of(P.H, k, 2, M.before, i, j)
-        slip, row = math.hypot(x, z), P.was[k]
-        if row >= 0 and slip <= NOISE * S.plan.number[LEFT] / h:
+        slip, row = math.sqrt(x * x + z * z), P.was[k]
+        if row >= 0 and slip <= NOISE * left_of(S, h):
             # what stuck moves by what the solver left of it
             slip = 0.0 if S.kept.table[row, KEPT_STICKS] == 1.0 else slip
         P.holds[k] = coefficient(S, P.contact[k], slip)
@@ -354,19 +358,20 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
     count, nb = tally.count[POINTS], len(scene.bodies.mass)
     start_impulses(S, h, nb)
     slop = S.plan.number[SLOP]
-    allowed = S.plan.number[LEFT] / h
-    left, sweeps = 0.0, 0
+    allowed = left_of(S, h)
+    left, sweeps, part = 0.0, 0, S.plan.number[LEFT_PART]
     for k in range(count):
         P.mu[k] = P.holds[k]
     for _ in range(MOST_YIELDS if count > 0 else 0):
-        left, more, newtons = solve_points(P, M, nb, count, allowed)
+        left, more, newtons = solve_points(P, M, nb, count, (allowed, part))
         sweeps += more
         tally.count[NEWTONS] += newtons
         if not math.isfinite(left):
             return Code.NOT_FINITE
         if not let_yield(S, count, allowed):
             break
-    keep_loads(S, count, committed)
+    if S.plan.number[FIXED] == 0.0:
+        keep_loads(S, count, committed)
     spread_parts(S, count, h, slop, nb)
     for b in range(nb):
         for c in range(6):
@@ -375,12 +380,12 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
     pushes = project_positions(P, M.shift, count, h, slop, most)
     number = tally.number
     # of two halves that make one step the worse one counts
-    number[RESIDUAL] = left if committed else max(left, number[RESIDUAL])
+    number[RESIDUAL] = left * allowed if committed else max(left * allowed, number[RESIDUAL])
     number[STEP_LENGTH] = h
     tally.count[ALL_SWEEPS] += sweeps
     tally.count[ALL_STEPS] += 1
     tally.count[ALL_POINTS] += count
-    tally.count[UNSOLVED] += 1 if left > allowed else 0
+    tally.count[UNSOLVED] += 1 if left > 1.0 else 0
     tally.count[PROJECTED] += 1 if pushes > 1 else 0
     pressing = 0
     for k in range(count):

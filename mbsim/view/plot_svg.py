@@ -20,11 +20,12 @@ _SPANS = 700
 
 
 class Curve(NamedTuple):
-    """A line and what it is called."""
+    """A line and what it is called; with `error`, by how much y may be off to either side."""
 
     name: str
     x: Array
     y: Array
+    error: Array | None = None
 
 
 def ticks(low: float, high: float, count: int = 5) -> list[float]:
@@ -78,6 +79,11 @@ def drawn(curves: Sequence[Curve], y_axis: str, x_axis: str) -> str:
         f"{escape(y_axis)}</text>"
     )
     for k, curve in enumerate(curves):
+        for t, middle, error in _bars(curve):
+            above, below = (np.clip(middle + side * error, low, high) for side in (1.0, -1.0))
+            points = np.column_stack([at_x(np.r_[t, t[::-1]]), at_y(np.r_[above, below[::-1]])])
+            text = " ".join(f"{a:.1f},{b:.1f}" for a, b in points)
+            parts.append(f'<polygon class="band b{k % COLOURS}" points="{text}"/>')
         for piece in _pieces(curve):
             points = np.column_stack([at_x(piece[0]), at_y(piece[1])])
             text = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
@@ -87,6 +93,23 @@ def drawn(curves: Sequence[Curve], y_axis: str, x_axis: str) -> str:
         for k, curve in enumerate(curves)
     )
     return "".join(parts) + f'</svg><p class="keys">{keys}</p>'
+
+
+def _bars(curve: Curve) -> list[tuple[Array, Array, Array]]:
+    """Return x, y and error of the parts of a curve where both are finite, in few points."""
+    if curve.error is None:
+        return []
+    good = np.isfinite(curve.y) & np.isfinite(curve.error)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(np.int8), [0]])))
+    found = []
+    for first, end in edges.reshape(-1, 2):
+        x, y, error = (each[first:end] for each in (curve.x, curve.y, curve.error))
+        span = max(1, -(-len(y) // _SPANS))
+        rows = np.unique(np.append(np.arange(0, len(y), span), len(y) - 1))
+        largest = np.maximum.reduceat(error, np.arange(0, len(y), span))
+        wide = np.append(largest, largest[-1])[: len(rows)]
+        found.append((x[rows], y[rows], wide))
+    return found
 
 
 def _pieces(curve: Curve) -> list[tuple[Array, Array]]:

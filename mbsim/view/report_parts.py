@@ -130,7 +130,7 @@ def _request(results: Results, id: int, units: UnitSystem) -> Iterator[str]:
     for k, text in enumerate(columns):
         if not text or not np.any(values[:, k]):
             continue  # a column that is not asked for, or nothing but zeros
-        curve = _curve(results, f"F{k + 1} {text}", values[:, k])
+        curve = _curve(results, f"F{k + 1} {text}", values[:, k], f"{name}/F{k + 1}")
         pictures.setdefault(quantity_of(results, name, k), []).append(curve)
     title = f"Request {id}" + (f": {label}" if label else "")
     if not pictures:
@@ -140,8 +140,18 @@ def _request(results: Results, id: int, units: UnitSystem) -> Iterator[str]:
         title = ""
 
 
-def _curve(results: Results, name: str, values: Any) -> Curve:
-    return Curve(name, np.asarray(results["time"], float), np.asarray(values, float))
+def _curve(results: Results, name: str, values: Any, signal: str = "") -> Curve:
+    """Return a curve, of a run with error bars with those, whose largest its name says."""
+    signal, time = signal or name, np.asarray(results["time"], float)
+    if signal not in results.errors:
+        return Curve(name, time, np.asarray(values, float))
+    error = np.asarray(results.errors[signal], float)
+    until = results.errors.reproducible_until(signal)
+    known = error[np.isfinite(error) & (time < until)]
+    said = f" \u00b1 {known.max():.2g}" if len(known) else ""
+    if np.isfinite(until):
+        said += f", not reproducible from {until:.4g}"
+    return Curve(name + said, time, np.asarray(values, float), error)
 
 
 def _figure(curves: Sequence[Curve], quantity: Quantity, units: UnitSystem, title: str) -> str:

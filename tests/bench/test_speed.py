@@ -15,6 +15,7 @@ from helpers.decks import COULOMB, GRAVITY, GROUND, contact, sphere, write_deck
 from helpers.folders import MODELS, USERFUNCS
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
+from mbsim.laws.constants import normal_constants
 
 pytestmark = pytest.mark.bench
 CLI = [sys.executable, "-c", "from mbsim.cli.main import main; main()"]
@@ -94,7 +95,7 @@ def test_calls_of_normal_laws():
     for name, values in NORMAL.items():
         kind = name.split(",")[0]
         law = NORMAL_LAWS[kind]
-        par = abi.normal_constants(law, Contact(id=1, cnf_type=kind, **values))
+        par = normal_constants(law, Contact(id=1, cnf_type=kind, **values))
         times = []
         for _ in range(6):
             began = time.perf_counter()

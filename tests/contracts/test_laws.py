@@ -10,6 +10,7 @@ import pytest
 
 from mbsim.laws import abi
 from mbsim.laws.catalog import NORMAL_LAWS
+from mbsim.laws.constants import normal_constants
 from mbsim.model.elements import Contact
 
 SHARED = {"stiffness": 1e5, "damping": 50.0, "dmax": 1e-3, "penalty": 1e4}
@@ -51,7 +52,7 @@ def normal(request):
     """A normal law with its constants: ``(law, constants)``."""
     name, attributes = NORMAL_CASES[request.param]
     law = NORMAL_LAWS[name]
-    return law, abi.normal_constants(law, Contact(id=1, cnf_type=name, **(SHARED | attributes)))
+    return law, normal_constants(law, Contact(id=1, cnf_type=name, **(SHARED | attributes)))
 
 
 def states(seed, count=500):

@@ -13,11 +13,13 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from click.shell_completion import ShellComplete
 from click.testing import CliRunner
 
 import mbsim
 from helpers.decks import GRAVITY, GROUND, contact, sphere, write_deck
 from helpers.folders import MODELS, PACKAGES
+from helpers.views import run_balls
 from mbsim.cli.main import main
 from mbsim.errors import ModelError, ResultsError, UnknownSignal
 from mbsim.model.request_types import TYPES
@@ -598,3 +600,22 @@ def test_units():
 def test_every_measure_of_a_request_has_its_quantity():
     measures = {*requests._MEASURES, *(m for type in TYPES.values() for m in type.measures)}
     assert measures == set(quantities._BY_MEASURE)
+
+
+def test_a_shell_completes_the_names_of_signals(tmp_path):
+    file = run_balls(tmp_path)
+    shell = ShellComplete(main, {}, "mbsim", "_MBSIM_COMPLETE")
+
+    def completed(*words):
+        return [item.value for item in shell.get_completions(list(words[:-1]), words[-1])]
+
+    assert completed("plo") == ["plot", "plot-law"]
+    assert [item.type for item in shell.get_completions(["plot"], "x")] == ["file"]
+    assert "bodies/" in completed("plot", str(file), "bod")
+    assert "bodies/2/" in completed("plot", str(file), "bodies/")
+    assert {"bodies/2/position", "bodies/2/position/"} <= set(
+        completed("plot", str(file), "bodies/2/pos")
+    )
+    assert completed("plot", str(file), "bodies/2/position/") == [
+        f"bodies/2/position/{part}" for part in ("x", "y", "z", "mag")
+    ]

@@ -8,8 +8,8 @@ from dataclasses import fields, replace
 import pytest
 
 from mbsim.expressions.functions import FUNCTIONS
-from mbsim.laws.abi import friction_parameters
 from mbsim.laws.catalog import FRICTION_LAWS
+from mbsim.laws.constants import friction_parameters
 from mbsim.manual.book import pages
 from mbsim.model import elements as el
 from mbsim.reader.kinds import TEXT, BadValueError

@@ -9,7 +9,7 @@ from collections import Counter
 import pytest
 
 from helpers.snippets import ROOT, blocks
-from mbsim.manual import book, make, mathematics, pictures, tables
+from mbsim.manual import book, gallery, make, mathematics, pictures, tables
 from mbsim.manual.book import INDEX, PAGES, pages
 from mbsim.manual.markdown import for_terminal
 
@@ -97,13 +97,14 @@ def test_tables_are_all_closed(page):
 
 def test_every_picture_has_its_maker_and_a_page():
     files = {path.name for path in pictures.FOLDER.glob("*") if path.name != ".gitkeep"}
-    assert files == set(pictures.drawings())
+    photographs = {photograph.name for photograph in gallery.GALLERY}
+    assert files == {*pictures.drawings(), *photographs}
     shown = {posixpath.basename(s) for p in pages().values() for _, s in _PICTURE.findall(p.text)}
     assert files <= shown
 
 
 def test_pictures_are_small():
-    for path in pictures.FOLDER.glob("*.svg"):
+    for path in pictures.FOLDER.glob("*.*g"):
         assert path.stat().st_size <= pictures.LARGEST, path.name
 
 

@@ -814,3 +814,18 @@ def test_dry_friction_element(method, tol, allowed):
     np.testing.assert_allclose(own, x, rtol=0, atol=allowed * 8.5e-4)
     np.testing.assert_allclose(own, built_in, rtol=0, atol=0.1 * allowed * 8.5e-4)
     np.testing.assert_allclose(results["force_elements/2/f"], f, rtol=0, atol=1e3 * allowed)
+
+
+def test_a_pendulum_on_a_wheel_falls_as_it_must_and_is_kept_up():
+    with mbsim.open(MODELS / "pendulum_wheel.xml") as sim:
+        sim.step(0.2)
+        found = sim.linearize(outputs=["requests/1/F2"])
+        assert found.eigenvalues[0].real == pytest.approx(4.9523, rel=2e-3)
+    with mbsim.open(MODELS / "pendulum_wheel.xml") as sim:
+        sim.inputs["torque"] = 0.4
+        sim.step(0.05)
+        while not sim.finished:
+            _, lean, rate, x, _, speed, _, _ = sim.signals["requests/1"]
+            sim.inputs["torque"] = 20 * lean + 4 * rate + 0.5 * x + 1.0 * speed
+            sim.step(0.01)
+        assert abs(lean) < 1e-2

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -324,3 +326,19 @@ def test_too_many_bodies_are_said(monkeypatch):
     monkeypatch.setattr(methods, "MOST_LINEARISED", 0)
     with pytest.raises(ModelError, match="1 bodies are more than the 0"):
         mbsim.simulate(mbsim.read_model(MODELS / "free_top.xml"), integrator="RADAU5")
+
+
+@pytest.mark.parametrize("method", ["DOPRI5", "DOP853"])
+@pytest.mark.parametrize(
+    ("deck", "most"), [("sdnd100", 2.0), ("belt_stick_slip", 1.5), ("belt_weakening", 1.6)]
+)
+def test_explicit_methods_take_no_more_at_a_looser_tolerance(method, deck, most):
+    """Beyond the bound of stability friction shook: sdnd100 took ten times as many at 1e-4."""
+    model = mbsim.read_model(MODELS / f"{deck}.xml")
+    work = [
+        mbsim.simulate(model, integrator=method, tol=tol).stats["rhs_evaluations"]
+        for tol in (1e-5, 1e-4, 1e-3, 1e-2)
+    ]
+    for tighter, looser in itertools.pairwise(work):
+        assert looser < most * tighter
+    assert max(work) < 2.0 * min(work)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 
 import numpy as np
@@ -87,3 +88,28 @@ def test_curves_end_where_there_is_no_number():
     assert "<b>" not in found
     assert "a &amp; b" in found
     assert drawn([Curve("n", x, np.full(6, np.nan))], "a", "t") == ""
+
+
+def test_error_bars_are_bands_about_their_curves():
+    x = np.linspace(0.0, 1.0, 3001)
+    error = np.full(3001, 0.1)
+    error[1000] = 0.3  # no row is left out
+    error[2500:] = np.inf
+    found = drawn([Curve("a", x, np.sin(x), error)], "a", "t")
+    band = re.search(r'<polygon class="band b0" points="([^"]*)"', found)[1]
+    points = np.array([[float(c) for c in p.split(",")] for p in band.split()])
+    above, below = np.split(points, 2)
+    widths = below[::-1, 1] - above[:, 1]
+    assert (widths >= -0.1).all()
+    assert widths.max() == pytest.approx(2.9 * np.median(widths), rel=0.2)
+    assert above[-1, 0] < 0.9 * 720
+
+
+def test_the_report_of_a_verified_run_says_how_far_it_is_off(tmp_path):
+    file = run_balls(tmp_path, verify=True)
+    with open_results(file) as results:
+        text = report(results)
+        largest = results.errors["requests/7"]
+    assert largest.shape[1] == 8
+    assert '<polygon class="band' in text
+    assert "\u00b1" in text

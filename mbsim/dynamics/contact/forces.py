@@ -96,8 +96,9 @@ PATCH, TILTING = 15, 16
 # counts, its force along x and y of the incident marker; growth of STIFFNESS over itself, the
 # user's own friction of sliding
 BRANCH, UNIT, ALONG_X, ALONG_Y, STIFFENS, LIMIT = range(17, 23)
-# the rates of normal force and of that, as found at a time; both as they were there
-NORMAL_SLOPE, LIMIT_SLOPE, FOUND_AT, NORMAL_THEN, LIMIT_THEN = range(23, 28)
+# the rates of normal force and of that, as found at a time; both as they were there; over how much
+# time they are still to be found, else 0
+NORMAL_SLOPE, LIMIT_SLOPE, FOUND_AT, NORMAL_THEN, LIMIT_THEN, FOUND_OVER = range(23, 29)
 
 # part by which k d/F has to be off 1 for a normal force's stiffness to change with its depth
 CHANGES = 1e-9

@@ -29,6 +29,7 @@ from mbsim.core.address import call_int, vector_at, view
 from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import ASK, BENDS, HALF, HALVES, HIDES, LOAD, PASS
+from mbsim.core.rotation import norm, vector
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.constraints.in_use import is_friction
 from mbsim.dynamics.contact.forces import (
@@ -37,6 +38,7 @@ from mbsim.dynamics.contact.forces import (
     BRANCH,
     DEPTH,
     FOUND_AT,
+    FOUND_OVER,
     LIMIT,
     LIMIT_SLOPE,
     LIMIT_THEN,
@@ -54,6 +56,7 @@ from mbsim.dynamics.contact.memory import slipping_mass
 from mbsim.dynamics.expressions.jets import value
 from mbsim.dynamics.forces.applied import side_of
 from mbsim.dynamics.stiction.rigid_friction import holding_force, side_of_rigid
+from mbsim.geometry.catalog import AT_POINT
 from mbsim.laws.catalog import BRANCHES, STICK, UNDECIDED
 from mbsim.laws.catalog import SLIP as SLIPS
 from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_SPEED, MU_STATIC
@@ -66,6 +69,9 @@ CHATTERS_MODES = 8.0
 #: How far ahead rates of normal forces are found: a part of what swings on the contact, and of the
 #: time in which it would be left.
 AHEAD, BEFORE_LEAVE = 1e-6, 1e-3
+#: Depths have digits down to so much of where the point is; times that differ by less are taken as
+#: one, the longest.
+RESOLVED, ALIKE = 1e-12, 0.1
 #: A load that changes by less of itself within a step passes no limit unseen.
 EVEN = 1e-3
 
@@ -101,30 +107,64 @@ def look_at(scene: Scene, context: int, t: float, y: F1, dy: F1) -> None:
 
 
 @jitable
+def longest_ahead(scene: Scene, t: float) -> float:
+    """Return the longest time over which a rate is still to be found, 0 if there is none."""
+    longest = 0.0
+    for s in range(len(scene.work.slot)):
+        row = scene.work.slot[s]
+        if row[FOUND_AT] == t:
+            longest = max(longest, row[FOUND_OVER])
+    return longest
+
+
+@jitable
+def ahead_of(scene: Scene, s: int) -> float:
+    """Return over what time the normal force in slot s shows its rate; 0 where positions cannot.
+
+    Of the slot alone: what another one is about to leave in is no time to it.
+    """
+    row, point = scene.work.slot[s], scene.work.points[s]
+    swings = math.sqrt(row[STIFFNESS] / slipping_mass(scene, s))
+    left, size = BEFORE_LEAVE * row[DEPTH], norm(vector(point[AT_POINT:]))
+    if left < RESOLVED * size:
+        return 0.0
+    return min(AHEAD / swings, left / max(abs(row[RATE]), 1e-300))
+
+
+@jitable
 def decide(scene: Scene, context: int, t: float, y: F1) -> None:
-    """Evaluate again with the rates of normal forces, where a branch depends on them."""
-    hit, work, h = scene.work.hit, scene.work, math.inf
+    """Evaluate again with the rates of normal forces, where a branch depends on them.
+
+    A rate is found over a time of its own in each slot: over that of a touch that begins or ends
+    the others would be rounding. Where positions have no digits for it, it is that of the depth.
+    """
+    hit, work, found = scene.work.hit, scene.work, False
     for k in range(hit[len(hit) - 1]):
         s = hit[k]
         row = work.slot[s]
         if scene.state.touching[s] == 1 and row[BRANCH] == UNDECIDED:
-            swings = math.sqrt(row[STIFFNESS] / slipping_mass(scene, s))
-            h = min(h, AHEAD / swings, BEFORE_LEAVE * row[DEPTH] / max(abs(row[RATE]), 1e-300))
-    if math.isinf(h) or h == 0.0:
+            h, found = ahead_of(scene, s), True
+            row[FOUND_AT], row[NORMAL_THEN], row[LIMIT_THEN] = t, row[NORMAL], row[LIMIT]
+            row[FOUND_OVER] = h
+            if h == 0.0:
+                row[NORMAL_SLOPE] = row[STIFFNESS] * row[RATE]
+                part = row[LIMIT] / row[NORMAL] if row[NORMAL] > 0.0 else 0.0
+                row[LIMIT_SLOPE] = part * row[NORMAL_SLOPE]
+    if not found:
         return
-    for k in range(hit[len(hit) - 1]):
-        row = work.slot[hit[k]]
-        row[NORMAL_THEN], row[LIMIT_THEN] = row[NORMAL], row[LIMIT]
-        row[FOUND_AT] = t
-    for i in range(len(y)):
-        work.ahead[0, i] = y[i] + h * work.idle[i]
     there, then = work.ahead[0], work.ahead[1]
-    look_at(scene, context, t + h, there, then)
-    for s in range(len(work.slot)):
-        row = work.slot[s]
-        if row[FOUND_AT] == t:
-            row[NORMAL_SLOPE] = (row[NORMAL] - row[NORMAL_THEN]) / h
-            row[LIMIT_SLOPE] = (row[LIMIT] - row[LIMIT_THEN]) / h
+    h = longest_ahead(scene, t)
+    while h > 0.0:
+        for i in range(len(y)):
+            there[i] = y[i] + h * work.idle[i]
+        look_at(scene, context, t + h, there, then)
+        for s in range(len(work.slot)):
+            row = work.slot[s]
+            if row[FOUND_AT] == t and row[FOUND_OVER] > ALIKE * h:
+                row[FOUND_OVER] = 0.0
+                row[NORMAL_SLOPE] = (row[NORMAL] - row[NORMAL_THEN]) / h
+                row[LIMIT_SLOPE] = (row[LIMIT] - row[LIMIT_THEN]) / h
+        h = longest_ahead(scene, t)
     look_at(scene, context, t, y, work.idle)
 
 

@@ -68,8 +68,9 @@ CLEAR = 100.0
 #: it: one that has just come to stick is at the limit but for rounding of the normal force.
 NEAR = 1e-6
 #: Slip over so many times the frequency of what slips is too short for what the spring is over its
-#: limit to be known, but for twice as much: both begin at 0 when two bodies touch, within a step.
-#: What it goes on towards decides then.
+#: limit to be known, but for twice as much: what it goes on towards decides then. Where two bodies
+#: have just touched not even that is known: both begin at 0 within a step, which may be any number
+#: of times as long as the touch. The spring is at its limit then at most.
 EARLY = 1e-3
 
 # what is kept: z, or M; z where it slips, M and its rate then; time then; twist less turn since
@@ -290,9 +291,12 @@ def stiction(  # noqa: C901
             zx, zy = px / k, py / k
         length = math.hypot(zx, zy)
         mode = STICK if k * length <= holds else SLIP
-        near = NEAR * length + min(0.5 * length, EARLY * math.hypot(v[0], v[1]) * heavy / k)
+        early = EARLY * math.hypot(v[0], v[1]) * heavy / k
+        near = NEAR * length + (early if before == BEGUN else min(0.5 * length, early))
         if before != SLIP and holds < k * length and k * (length - near) <= holds:
             mode = STICK
+            if before == BEGUN:
+                zx, zy = zx * holds / (k * length), zy * holds / (k * length)
             if frozen:
                 own = mu_static * inputs.nforce_rate / k - holds / k * (growth - ease)
                 sure = 0 if math.isnan(own) else 1

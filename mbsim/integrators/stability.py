@@ -1,0 +1,91 @@
+"""How an explicit method that runs alone keeps to its bound of stability.
+
+The error lets steps beyond that bound pass as long as what they amplify is within the tolerance.
+What is amplified is then rejected, or shaken: friction that turns sign from step to step, what
+rests that trembles. Steps within the bound are mostly fewer in all, and a looser tolerance takes no
+more of them. Not where friction shakes within a loose tolerance and the motion hardly sees it:
+there steps that are many times as long go on. Which of the two goes farther for its evaluations is
+found by trying: a window of the other kind, now and then.
+"""
+
+from __future__ import annotations
+
+from mbsim.core.jitable import jitable
+from mbsim.integrators.scheme import (
+    EVALUATIONS,
+    FREE,
+    PACE_FREE,
+    PACE_WITHIN,
+    STEP,
+    STIFFNESS,
+    TIME,
+    WINDOW_STEPS,
+    WINDOW_STIFF,
+    WINDOW_TIME,
+    WINDOW_WORK,
+    WINDOWS,
+    Method,
+)
+
+#: From here on a step is at the stability bound; as long as this it stays within.
+BOUND, WITHIN = 1.6, 1.8
+#: A step below this error, over the allowed one, moves nothing that the rate could be of.
+NOTHING = 1e-10
+#: Evaluations over which it is found how far steps go, what part of these is at the bound where it
+#: is that which bounds them, and windows until the other kind is tried again: from steps beyond the
+#: bound soon, for motions that stick and slip in turn look like others for a while.
+WINDOW, STIFF_PART, SOON, AGAIN = 250, 0.1, 12, 40
+#: Steps within the bound are taken though they go by so much less far: they shake nothing.
+CALMER = 0.5
+
+
+@jitable
+def stay_within(m: Method, h: float, error: float) -> None:
+    """Let the step after one of length h and this error end within the bound of stability.
+
+    A step is no more than halved, for a kink looks like a high rate.
+    """
+    if m.memory[STIFFNESS] > 0.0 and error > NOTHING:
+        m.memory[STEP] = min(m.memory[STEP], max(0.5, WITHIN / m.memory[STIFFNESS]) * h)
+
+
+@jitable
+def begin_window(m: Method) -> None:
+    """Count from the committed point on."""
+    m.memory[WINDOW_STEPS] = m.memory[WINDOW_STIFF] = 0.0
+    m.memory[WINDOW_TIME], m.memory[WINDOW_WORK] = m.memory[TIME], m.counts[EVALUATIONS]
+
+
+@jitable
+def judge_window(m: Method) -> None:
+    """Note how far the steps of the window went, and choose the kind of the next ones."""
+    pace = (m.memory[TIME] - m.memory[WINDOW_TIME]) / (
+        m.counts[EVALUATIONS] - m.memory[WINDOW_WORK]
+    )
+    m.memory[PACE_FREE if m.memory[FREE] == 1.0 else PACE_WITHIN] = pace
+    m.memory[WINDOWS] += 1.0
+    if m.memory[WINDOW_STIFF] < STIFF_PART * m.memory[WINDOW_STEPS]:
+        # the error bounds them: nothing that was found holds any more
+        m.memory[PACE_FREE] = m.memory[PACE_WITHIN] = m.memory[FREE] = m.memory[WINDOWS] = 0.0
+    elif min(m.memory[PACE_FREE], m.memory[PACE_WITHIN]) == 0.0 or m.memory[WINDOWS] >= (
+        SOON if m.memory[FREE] == 1.0 else AGAIN
+    ):
+        m.memory[FREE], m.memory[WINDOWS] = 1.0 - m.memory[FREE], 0.0
+    else:
+        within = m.memory[PACE_WITHIN] >= CALMER * m.memory[PACE_FREE]
+        m.memory[FREE] = 0.0 if within else 1.0
+
+
+@jitable
+def keep_to_bound(m: Method, h: float, error: float) -> None:
+    """Let the step after one of length h and this error keep to the bound, where that pays."""
+    if m.memory[WINDOW_WORK] == 0.0:
+        begin_window(m)
+    m.memory[WINDOW_STEPS] += 1.0
+    if m.memory[STIFFNESS] > BOUND and error > NOTHING:
+        m.memory[WINDOW_STIFF] += 1.0
+    if m.memory[FREE] == 0.0:
+        stay_within(m, h, error)
+    if m.counts[EVALUATIONS] - m.memory[WINDOW_WORK] >= WINDOW:
+        judge_window(m)
+        begin_window(m)
