@@ -68,18 +68,18 @@ def moved_rate(p: Problem, m: Method, t: float) -> float:
     code = failure_or(m, call_int(p.rhs, (p.context, t, 0.0, m.trial, k[THERE])))
     if code != 0:
         return -1.0
-    d = k[DIFFERENCES:]
+    size = k[DIFFERENCES:]
     for j in range(RATES):
         for i in range(n):
-            d[j, i] = 0.0
+            size[j, i] = 0.0
     for i in range(n):
         k[SHIFT, i] = k[THERE, i] - k[HERE, i]
         is_rate = m.kinds[i] != POSITION
-        d[1 if is_rate else 0, i] = m.trial[i] - m.y[i]
+        size[1 if is_rate else 0, i] = m.trial[i] - m.y[i]
         if is_rate:
-            d[2, i] = k[SHIFT, i]
-    call_float(p.norm, (p.context, t, EACH, d[0], m.y))
-    return rate_of(m.memory[OWN_TIME] * d[0, 0], d[1, 0], d[2, 0])
+            size[2, i] = k[SHIFT, i]
+    call_float(p.norm, (p.context, t, EACH, size[0], m.y))
+    return rate_of(m.memory[OWN_TIME] * size[0, 0], size[1, 0], size[2, 0])
 
 
 @jitable
