@@ -9,8 +9,8 @@ import numpy as np
 from mbsim.core import jit
 from mbsim.core.address import pack
 from mbsim.core.problem import HOOK, Problem
-from mbsim.integrators import branches, changing, events
-from mbsim.integrators.scheme import Method, Scheme, Steps, Workspace
+from mbsim.integrators import branches, changing, events, rates
+from mbsim.integrators.scheme import WATCH, Method, Scheme, Steps, Workspace
 
 
 def bind(
@@ -28,5 +28,7 @@ def bind(
     locates = jit.address(events.serve, events.ASKED) if problem.happens != 0 else 0
     probes = jit.address(probe.attempt, HOOK) if probe is not None else 0
     calm = jit.address(changing.serve, changing.ASKED) if probe is not None else 0
-    steps = Steps(context, attempt, fit_dense, *numbers, looks, locates, probes, calm)
+    changes = method.memory[WATCH] == 1.0 and not scheme.implicit
+    rate = jit.address(rates.serve, rates.ASKED) if changes else 0
+    steps = Steps(context, attempt, fit_dense, *numbers, looks, locates, probes, calm, rate)
     return steps, (table, workspace)

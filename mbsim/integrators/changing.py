@@ -8,7 +8,10 @@ The error lets steps go beyond that bound; where many are at it, they are kept w
 The implicit method tries an explicit step now and then. What its own last steps took, less what
 explicit ones would have taken instead, is summed up; where that is as much as it would cost to be
 wrong, and two trials agree, the explicit method goes on. `Methods.change_over` learns from what
-came of a change. A run that is stiff from its begin begins anew: `Methods.begin_anew`.
+came of a change. A run that is stiff from its begin begins anew: `Methods.begin_anew`. Where the
+rate at the begin, measured (`rates.largest_rate`), would bound very many steps, it does so at once.
+That rate is asked for as well before the implicit method is left: the stages of a trial on a motion
+that holds what is fast tell nothing of that.
 
 How many steps are ahead is judged by the pace of the run so far, and of the last WINDOW steps once
 there are so many: an impact after a flight takes little of the run, and is over before there are.
@@ -29,8 +32,10 @@ import math
 
 from numba import types
 
-from mbsim.core.address import call_int
+from mbsim.core.address import call_float, call_int
 from mbsim.core.jitable import jitable
+from mbsim.core.problem import Problem
+from mbsim.integrators.rates import largest_rate
 from mbsim.integrators.scheme import (
     BEGUN,
     BEGUN_WORK,
@@ -53,6 +58,7 @@ from mbsim.integrators.scheme import (
     STIFFNESS,
     TIME,
     WAS_CUT,
+    WATCH,
     Method,
     Steps,
     failure_or,
@@ -74,7 +80,9 @@ WINDOW = 200
 EVALUATIONS_A_STEP = 6.0
 #: A change is worth it for so many steps that are still to be taken; once the implicit method has
 #: run, and nothing is to be loaded for it, for fewer.
-WORTH, WORTH_AGAIN = 2000, 200
+WORTH, WORTH_AGAIN = 300, 200
+#: At the begin, where the largest rate is measured: what is lost if it was wrong is small then.
+WORTH_AT_ONCE = 4000
 #: With so many ahead the implicit method is tried after as many steps as there is patience for.
 MANY = 20_000
 #: For fewer steps that stability does not bound it was not worth it to leave the implicit method.
@@ -104,8 +112,21 @@ def is_bounded(m: Method) -> bool:
 
 
 @jitable
-def is_stiff(m: Method, h: float, t_end: float) -> bool:
-    """Note what the last explicit step found; return whether to change over."""
+def note_pace(m: Method, t: float) -> None:
+    """Count an explicit step, and note how many there are a time."""
+    m.memory[EXPLICIT_STEPS] += 1.0
+    steps = m.memory[EXPLICIT_STEPS]
+    # the run so far: after a change back only whole windows count, for that may be in an impact
+    if steps % WINDOW == 0.0 or m.counts[STEPS] <= min(steps, WINDOW):
+        work = m.counts[EVALUATIONS] - m.memory[BEGUN_WORK]
+        m.memory[PACE] = work / EVALUATIONS_A_STEP / (t - m.memory[BEGUN])
+    if steps % WINDOW == 0.0:
+        m.memory[BEGUN], m.memory[BEGUN_WORK] = t, m.counts[EVALUATIONS]
+
+
+@jitable
+def count_stiff(m: Method, h: float) -> None:
+    """Count a step of length h that was at the bound of stability, or one that was not."""
     if m.memory[STIFFNESS] > BOUND:
         # a hidden rate is far beyond the bound: what else it bounds trembles soon
         m.memory[STIFF_STEPS] += 2.0 if m.memory[STIFFNESS] == math.inf else 1.0
@@ -118,14 +139,30 @@ def is_stiff(m: Method, h: float, t_end: float) -> bool:
             m.memory[STIFF_STEPS] = 0.0
     if m.memory[LAST_STEP] < THROWS * m.memory[STIFF_STEP]:
         m.memory[BOUNDED] = 1.0
-    m.memory[EXPLICIT_STEPS] += 1.0
-    t, steps = m.memory[TIME], m.memory[EXPLICIT_STEPS]
-    # the run so far: after a change back only whole windows count, for that may be in an impact
-    if steps % WINDOW == 0.0 or m.counts[STEPS] <= min(steps, WINDOW):
-        work = m.counts[EVALUATIONS] - m.memory[BEGUN_WORK]
-        m.memory[PACE] = work / EVALUATIONS_A_STEP / (t - m.memory[BEGUN])
-    if steps % WINDOW == 0.0:
-        m.memory[BEGUN], m.memory[BEGUN_WORK] = t, m.counts[EVALUATIONS]
+
+
+@jitable
+def begins_stiff(m: Method, steps: Steps, t_end: float) -> bool:
+    """Return whether stability will bound so many steps that the implicit method is to begin."""
+    if m.memory[WATCH] == 0.0 or steps.rate == 0 or m.counts[STEPS] > 0:
+        return False
+    t = m.memory[TIME]
+    rate = call_float(steps.rate, (steps.context, t))
+    if not WORTH_AT_ONCE * WITHIN < rate * (t_end - t) < math.inf:
+        return False
+    # the steps that stability would bound: shorter ones of a transient are good for either method
+    m.memory[STEP], m.memory[PACE] = WITHIN / rate, rate / WITHIN
+    m.memory[STIFF_STEPS] = m.memory[PATIENCE]
+    return True
+
+
+@jitable
+def is_stiff(m: Method, steps: Steps, h: float, t_end: float) -> bool:
+    """Note what the last explicit step found; return whether to change over."""
+    t = m.memory[TIME]
+    note_pace(m, t)
+    count_stiff(m, h)
+    taken = m.memory[EXPLICIT_STEPS]
     # steps that grow, as from a start, are not yet those to come
     most = (t_end - t) / m.memory[STEP] if m.memory[WAS_CUT] == 0.0 else math.inf
     ahead = min((t_end - t) * m.memory[PACE], most)
@@ -139,14 +176,14 @@ def is_stiff(m: Method, h: float, t_end: float) -> bool:
     if enough and m.memory[STIFF_STEPS] > 1.0:
         m.memory[BOUNDED] = 1.0
     # as many steps a time as when it was stiff: it is so again, though nothing else may show it
-    again = m.memory[PACE] >= m.memory[COSTLY] and steps >= max(WINDOW, m.memory[PATIENCE])
+    again = m.memory[PACE] >= m.memory[COSTLY] and taken >= max(WINDOW, m.memory[PATIENCE])
     if again or m.memory[STIFF_STEPS] >= m.memory[PATIENCE]:
         return enough
-    return ahead > MANY and steps >= m.memory[PATIENCE]
+    return ahead > MANY and taken >= m.memory[PATIENCE]
 
 
 @jitable
-def is_calm(m: Method, context: int, probe: int, t_end: float) -> bool:
+def is_calm(p: Problem, m: Method, context: int, probe: int, t_end: float) -> bool:
     """Try an explicit step now and then; return whether to change back, with a step to begin."""
     m.memory[IMPLICIT_STEPS] += 1.0
     taken = m.memory[IMPLICIT_STEPS]
@@ -168,17 +205,25 @@ def is_calm(m: Method, context: int, probe: int, t_end: float) -> bool:
             part = min(part, WITHIN / m.memory[STIFFNESS])
     work = m.counts[EVALUATIONS] - EVALUATIONS_A_STEP + m.counts[JACOBIANS] - m.memory[BEGUN_WORK]
     gain = -math.inf
+    if part > 0.0 and IMPLICIT_WORK * work / taken > EVALUATIONS_A_STEP / part:
+        # where the motion excites nothing that is fast the stages do not tell
+        rate = largest_rate(p, m, t)
+        if rate > 0.0:
+            part = min(part, WITHIN / (rate * h))
     if part > 0.0:
         # of steps of this length, and no more time than they took: short ones are behind an event
         each = IMPLICIT_WORK * work / taken
         gain = (each - EVALUATIONS_A_STEP / part) * min((t - m.memory[BEGUN]) / h, taken)
+    # what it takes a time, against what the explicit method took: of that the trial is another word
+    costly = IMPLICIT_WORK * work > EVALUATIONS_A_STEP * m.memory[COSTLY] * (t - m.memory[BEGUN])
+    agreed = 1.0 if costly else 0.5
     m.memory[BEGUN] = t
     m.memory[BEGUN_WORK] = m.counts[EVALUATIONS] + m.counts[JACOBIANS]
     # a short step, as after a change or a switch, is good for either method: one that is shorter
     # than before the model was found stiff tells less
     short = min(1.0, part) * h * m.memory[PACE] < 1.0
     # what one trial tells is of where it was made
-    gain = min(gain * (SHORT_TELLS if short else 1.0), 0.5 * WRONG * m.memory[RELUCTANCE])
+    gain = min(gain * (SHORT_TELLS if short else 1.0), agreed * WRONG * m.memory[RELUCTANCE])
     m.memory[CALM_STEPS] = max(0.0, m.memory[CALM_STEPS] + gain)
     if m.memory[CALM_STEPS] < WRONG * m.memory[RELUCTANCE]:
         return False
@@ -188,8 +233,8 @@ def is_calm(m: Method, context: int, probe: int, t_end: float) -> bool:
 
 def serve(context: int, probe: int, t_end: float) -> int:
     """Whether the implicit method is to be left: behind an address, for most runs never take it."""
-    _, m = in_workspace(context)
-    return 1 if is_calm(m, context, probe, t_end) else 0
+    p, m = in_workspace(context)
+    return 1 if is_calm(p, m, context, probe, t_end) else 0
 
 
 @jitable
@@ -197,4 +242,4 @@ def changes_over(m: Method, steps: Steps, h: float, t_end: float) -> bool:
     """Return whether the other method is to go on from the committed point."""
     if steps.implicit:
         return call_int(steps.calm, (steps.context, steps.probe, t_end)) == 1
-    return is_stiff(m, h, t_end)
+    return is_stiff(m, steps, h, t_end)

@@ -15,6 +15,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.problem import (
     BY_CHECK,
     BY_ERROR,
+    BY_JUMP,
     BY_NEWTON,
     BY_NOT_FINITE,
     CHANGES_OVER,
@@ -35,7 +36,7 @@ from mbsim.core.problem import (
 )
 from mbsim.integrators.attempt import LOCATED, attempt_to_event
 from mbsim.integrators.branches import BEGIN, TAKEN
-from mbsim.integrators.changing import changes_over, is_bounded
+from mbsim.integrators.changing import begins_stiff, changes_over, is_bounded
 from mbsim.integrators.control import (
     HOLD,
     extrapolated_factor,
@@ -44,6 +45,7 @@ from mbsim.integrators.control import (
     smallest_step,
     starting_step,
 )
+from mbsim.integrators.positions import jumps
 from mbsim.integrators.scheme import (
     AFTER_REJECTION,
     CHANGE_DUE,
@@ -386,6 +388,9 @@ def advance(  # noqa: C901
                 # behind the switch all is known anew
                 m.memory[TIME] = min(m.memory[ROW_ENDS], t_end)
                 m.memory[HAVE_F] = 0.0
+                if steps.order > 0.0 and jumps(p, m, m.memory[TIME]):
+                    m.counts[LAST_REASON] = BY_JUMP
+                    return STEP_TOO_SMALL
                 continue
         t = m.memory[TIME]
         if m.memory[HAVE_F] == 0.0 or m.memory[STEP] == 0.0:
@@ -393,6 +398,8 @@ def advance(  # noqa: C901
             if code != 0:
                 m.counts[CODE] = code
                 return FAILED
+            if begins_stiff(m, steps, t_end):
+                return CHANGES_OVER
         floor = smallest_step(t, m.memory[OWN_TIME], h_min)
         if steps.order == 0.0 and t >= m.memory[FAILED_AT] and bound_is_due(m):
             m.memory[STEP] = stable(p, m, t, h_max)

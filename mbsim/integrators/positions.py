@@ -5,7 +5,7 @@ Problems without positions have no such hooks: nothing is done then.
 
 from __future__ import annotations
 
-from mbsim.core.address import call_int
+from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import (
@@ -19,7 +19,7 @@ from mbsim.core.problem import (
     VELOCITY,
     Problem,
 )
-from mbsim.integrators.scheme import Method, project
+from mbsim.integrators.scheme import LAST_ERROR, TOL, Method, project
 
 
 @jitable
@@ -98,3 +98,20 @@ def put_along(p: Problem, m: Method, t: float, y: F1, r: F1, w: F1) -> None:
     for i in range(len(y)):
         if m.kinds[i] == POSITION:
             r[i] = w[i]
+
+
+@jitable
+def jumps(p: Problem, m: Method, t: float) -> bool:
+    """Return whether joints and motions ask for another point at t than the committed one.
+
+    By more than the tolerance: memory[LAST_ERROR] is how many times. Steps that begin behind a jump
+    could not tell it from where they lead, those of an implicit method least: its stages are put
+    where the motion has them.
+    """
+    for i in range(len(m.y)):
+        m.trial[i] = m.y[i]
+    project(p, m, t, 0.0, m.trial)
+    for i in range(len(m.y)):
+        m.error[i] = m.trial[i] - m.y[i]
+    m.memory[LAST_ERROR] = call_float(p.norm, (p.context, t, 0.0, m.error, m.trial)) / m.memory[TOL]
+    return not m.memory[LAST_ERROR] <= 1.0

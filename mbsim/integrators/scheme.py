@@ -172,11 +172,13 @@ class Steps(NamedTuple):
     implicit: bool
     resumes: float
     # what only some problems need, 0 for others: `branches.serve`, `events.serve`; of AUTO's
-    # implicit method `attempt` of the explicit one, and `changing.serve` that tries it
+    # implicit method `attempt` of the explicit one, and `changing.serve` that tries it; of AUTO's
+    # explicit method `rates.serve`
     branches: int
     events: int
     probe: int
     calm: int
+    rate: int
 
 
 def make(scheme: Scheme, y0: Any, t0: float, kinds: Any = None, rows: int = 1) -> Method:

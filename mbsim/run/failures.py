@@ -31,6 +31,7 @@ def give_up(system: System, settings: Settings, method: Any) -> NoReturn:
         problem.BY_CHECK: "an impact would begin deeper than its contact time allows",
         problem.BY_NOT_FINITE: "a force or acceleration is not finite",
         problem.BY_NEWTON: "Newton's iteration does not converge",
+        problem.BY_JUMP: "",
     }[int(counts[scheme.LAST_REASON])]
     unsolved = counts[scheme.LAST_REASON] == problem.BY_NEWTON
     if unsolved:
@@ -47,6 +48,13 @@ def give_up(system: System, settings: Settings, method: Any) -> NoReturn:
         where.append(f"Force_Contact[{system.contact_ids[contact]}]")
     elif unsolved:
         where.extend(_held_by(system, body))
+    if counts[scheme.LAST_REASON] == problem.BY_JUMP:
+        now, times = memory[scheme.TIME], memory[scheme.LAST_ERROR]
+        raise SolverError(
+            f"at time {now:.9g} a position or velocity jumps that joints and motions give, by "
+            f"{times:.3g} times what a step's error may be: no step goes on; "
+            f"at {', '.join(where) or 'no single element'}. Results up to there are kept."
+        )
     raise SolverError(
         f"the step fell to {memory[scheme.STEP]:.3g} at time {memory[scheme.TIME]:.9g} "
         f"because {reason}; at {', '.join(where) or 'no single element'}. "

@@ -472,7 +472,8 @@ class Runner:
             self.log.line(self.methods.begin_anew(self._go_back))
         elif outcome == problem.CHANGES_OVER:
             self.log.line(self.methods.change_over())
-        if outcome == problem.STEP_TOO_SMALL and self.methods.retreat():
+        jumped = outcome == problem.STEP_TOO_SMALL and counts[scheme.LAST_REASON] == problem.BY_JUMP
+        if outcome == problem.STEP_TOO_SMALL and not jumped and self.methods.retreat():
             self.log.line(
                 f"time {now:.9g}: the implicit step became too small: explicit from here on"
             )

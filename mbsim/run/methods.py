@@ -37,6 +37,8 @@ FEW = 16
 #: A run that changes over within so many steps has been stiff from its begin: going back there
 #: costs about what the implicit method takes until it runs well from anywhere else.
 BEGIN_STEPS = 4 * FIRST_PATIENCE
+#: By how much AUTO is slower to change after what did not pay, at most.
+MOST_LEARNT = 16.0
 #: The part of a step's error that Newton's iteration may leave where friction holds without give.
 #: What that decides by are forces, over their limits: a few 1e-9 m of a stiff contact, far less
 #: than the error of a step, made it slip.
@@ -211,8 +213,10 @@ class Methods:
         work = float(counts[scheme.EVALUATIONS] + counts[scheme.JACOBIANS])
         if not stiff:
             took = IMPLICIT_START + IMPLICIT_WORK * (work - self._since[1])
-            pays = took < EVALUATIONS_A_STEP * memory[scheme.COSTLY] * (now - self._since[0])
-            factor = 1.0 / 1.5 if pays else 1.5
+            instead = EVALUATIONS_A_STEP * memory[scheme.COSTLY] * (now - self._since[0])
+            factor = min(MOST_LEARNT, max(1.0 / 1.5, (took / instead) ** 2))
+            # with fewer explicit steps a time it does not pay
+            memory[scheme.COSTLY] *= max(1.0, took / instead)
             memory[scheme.PATIENCE] = max(FIRST_PATIENCE, factor * memory[scheme.PATIENCE])
         elif self.changes > 0:
             free = memory[scheme.EXPLICIT_STEPS] - memory[scheme.STIFF_STEPS]

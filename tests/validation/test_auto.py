@@ -37,8 +37,7 @@ def test_a_block_that_creeps_is_stiff_from_soon_on(tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "changes"),
-    # the begin of overdamped is a motion of 1e-4 s, of which steps are short in any method
-    [("rolling_sphere", 1), ("overdamped", 3), ("preloaded_stop", 1)],
+    [("rolling_sphere", 1), ("overdamped", 1), ("preloaded_stop", 1)],
 )
 def test_a_run_that_is_stiff_from_its_begin_changes_over_within_some_steps(name, changes):
     model = mbsim.read_model(STIFF / f"{name}.xml")
@@ -64,7 +63,34 @@ def test_a_run_that_is_stiff_from_its_begin_is_the_implicit_method_s(name, tol):
     assert there <= here < 1.1 * there
 
 
-@pytest.mark.parametrize("name", ["drop_m", "bowling_ball", "incline_slip"])
+@pytest.mark.parametrize("name", ["incline_slip", "incline_creep", "stiff/rolling_sphere"])
+def test_where_stability_would_bound_thousands_of_steps_radau5_begins_at_once(name):
+    """Tried first, explicit steps cost as much as the whole run of RADAU5, or 13 times that."""
+    model = mbsim.read_model(MODELS / f"{name}.xml")
+    auto, implicit = (mbsim.simulate(model, integrator=one) for one in ("AUTO", "RADAU5"))
+    assert auto.stats["method_changes"] == 1
+    assert auto.stats["steps"] == implicit.stats["steps"]
+    np.testing.assert_array_equal(auto["bodies/2/position"], implicit["bodies/2/position"])
+    # six to measure the rate, two for a first step; later ones are measured in trials
+    tried = auto.stats["rhs_evaluations"] - implicit.stats["rhs_evaluations"]
+    assert 0 < tried < 20 + 0.05 * implicit.stats["rhs_evaluations"]
+
+
+@pytest.mark.parametrize("tol", [1e-4, 1e-5])
+@pytest.mark.parametrize("name", ["stiff/torsion_top", "lugre_stick_slip"])
+def test_it_stays_where_the_motion_excites_nothing_that_is_fast(name, tol):
+    """The stages of a trial on such a motion tell of no rate: 3 to 7 changes."""
+    stats = mbsim.simulate(mbsim.read_model(MODELS / f"{name}.xml"), tol=tol).stats
+    assert stats["method_changes"] == 1
+
+
+def test_what_did_not_pay_is_not_tried_again_and_again():
+    """Where explicit steps are at the bound, but the motion has as short ones: 16 changes."""
+    stats = mbsim.simulate(mbsim.read_model(MODELS / "cam_from_stl.xml"), tol=1e-3).stats
+    assert stats["method_changes"] <= 6
+
+
+@pytest.mark.parametrize("name", ["bouncing_sphere", "chain_on_box", "sdnd121"])
 def test_an_impact_or_a_short_stiff_run_changes_nothing(name):
     auto = mbsim.simulate(mbsim.read_model(MODELS / f"{name}.xml"))
     assert auto.stats["method_changes"] == auto.stats["jacobians"] == 0
@@ -189,11 +215,14 @@ def test_what_rests_on_strong_dampers_does_not_shake_at_a_loose_tolerance(tmp_pa
 
 @pytest.mark.parametrize("name", ["lugre_stick_slip", "belt_stick_slip"])
 def test_stick_and_slip_in_turn_are_stiff_again_at_once(name):
-    """Between phases of slip AUTO waited longer each time: 2.7 times RADAU5's evaluations."""
+    """Between phases of slip AUTO waited longer each time: 2.7 times RADAU5's evaluations.
+
+    Where the rate is measured it does not leave `lugre_stick_slip` at all.
+    """
     model = mbsim.read_model(MODELS / f"{name}.xml")
     auto, stiff = (mbsim.simulate(model, integrator=method) for method in ("AUTO", "RADAU5"))
-    assert auto.stats["method_changes"] >= 2
-    assert auto.stats["rhs_evaluations"] < 2.3 * stiff.stats["rhs_evaluations"]
+    assert auto.stats["method_changes"] >= 1
+    assert auto.stats["rhs_evaluations"] < 1.5 * stiff.stats["rhs_evaluations"]
 
 
 @pytest.mark.parametrize(("method", "rejected"), [("DOPRI5", 0.5), ("RADAU5", 1.0)])
@@ -259,12 +288,14 @@ def test_it_learns_what_a_change_was_worth():
     # 0.01 s would have been 30 explicit evaluations
     counts[scheme.EVALUATIONS], memory[scheme.TIME] = 200, 0.01
     methods.change_over()
-    assert memory[scheme.PATIENCE] == 1.5 * first
+    # it took 250 + 2.5 * 200: more than 16 at its square
+    assert memory[scheme.PATIENCE] == 16.0 * first
     # explicit: stiff at once
     memory[scheme.EXPLICIT_STEPS], memory[scheme.STIFF_STEPS] = 20.0, 15.0
     methods.change_over()
     assert memory[scheme.RELUCTANCE] == 2.0
-    # implicit: 10 s for 300 evaluations
+    # implicit: 10 s for 300 evaluations; what was learnt wears off by stays that pay
+    memory[scheme.PATIENCE] = first
     counts[scheme.EVALUATIONS], memory[scheme.TIME] = 500, 10.0
     methods.change_over()
     assert memory[scheme.PATIENCE] == first
