@@ -80,7 +80,7 @@ WINDOW = 200
 EVALUATIONS_A_STEP = 6.0
 #: A change is worth it for so many steps that are still to be taken; once the implicit method has
 #: run, and nothing is to be loaded for it, for fewer.
-WORTH, WORTH_AGAIN = 300, 200
+WORTH, WORTH_AGAIN = 2000, 200
 #: At the begin, where the largest rate is measured: what is lost if it was wrong is small then.
 WORTH_AT_ONCE = 4000
 #: With so many ahead the implicit method is tried after as many steps as there is patience for.

@@ -90,7 +90,9 @@ def test_what_did_not_pay_is_not_tried_again_and_again():
     assert stats["method_changes"] <= 6
 
 
-@pytest.mark.parametrize("name", ["bouncing_sphere", "chain_on_box", "sdnd121"])
+@pytest.mark.parametrize(
+    "name", ["drop_m", "bowling_ball", "bouncing_sphere", "chain_on_box", "sdnd121"]
+)
 def test_an_impact_or_a_short_stiff_run_changes_nothing(name):
     auto = mbsim.simulate(mbsim.read_model(MODELS / f"{name}.xml"))
     assert auto.stats["method_changes"] == auto.stats["jacobians"] == 0
