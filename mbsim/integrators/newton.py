@@ -24,10 +24,14 @@ from mbsim.integrators.scheme import (
     JACOBIANS,
     LEFT,
     LEFT_PART,
+    OWN_TIME,
+    REJECTED,
     REST,
     RETRY,
     TOL,
+    WATCH,
     Method,
+    note_failure,
 )
 
 # what `judge` says
@@ -42,6 +46,9 @@ FELT = 1e-6
 LEAST_REST = 0.05
 #: The step after one whose equations were not solved, where nothing is known of what would be.
 HALF, QUARTER = 0.5, 0.25
+#: Every so many rejections of steps below this part of the problem's own time it is asked whether f
+#: is a function at all.
+SMALL, ASK_AGAIN = 1e-4, 16
 
 
 @jitable
@@ -181,3 +188,30 @@ def unless_singular(code: int) -> int:
 def as_failure(code: int) -> int:
     """Return the code of a step whose equations were not solved for the reason `code`."""
     return code if code > 0 else Code.NOT_CONVERGED
+
+
+@jitable
+def repeats(p: Problem, m: Method, t: float) -> bool:
+    """Return whether f at the committed point is the same, to tol, when it is asked for twice.
+
+    A user's function that is none of its arguments leaves no equation to solve.
+    """
+    m.counts[EVALUATIONS] += 2
+    for out in (m.trial, m.error):
+        if call_int(p.rhs, (p.context, t, 0.0, m.y, out)) != 0:
+            return True
+    for i in range(len(m.y)):
+        m.error[i] = m.memory[OWN_TIME] * (m.trial[i] - m.error[i])
+    return not call_float(p.norm, (p.context, t, 0.0, m.error, m.y)) > m.memory[TOL]
+
+
+@jitable
+def ask_again(p: Problem, m: Method, t: float, h: float) -> None:
+    """Fail where steps of an implicit method fall because f is no function, h being the next one.
+
+    AUTO is spared: it goes on with its explicit method.
+    """
+    small = m.memory[FACTORED_STEP] > 0.0 and h < SMALL * m.memory[OWN_TIME]
+    if small and m.memory[WATCH] == 0.0 and m.counts[REJECTED] % ASK_AGAIN == 0:
+        if not repeats(p, m, t):
+            note_failure(m, Code.NOT_REPEATED)

@@ -149,6 +149,8 @@ def fail(system: System, detector: Any, code: int, t: float) -> NoReturn:
             )
         reproduce(system.user_friction[element], system.scene.work.law_in, element)
         raise PluginError(f"Force_Contact[{element}]: its subroutine failed at time {t:.12g}")
+    if code == Code.NOT_REPEATED:
+        raise SolverError(_not_repeated(system, t))
     if code == Code.DETECTOR_FAILED and detector is not None:
         raise SolverError(f"FCL failed at time {t:.9g}: {detector.failure}")
     if code == Code.CROWDED:
@@ -160,6 +162,22 @@ def fail(system: System, detector: Any, code: int, t: float) -> NoReturn:
         raise SolverError(f"a force or acceleration{where} is not finite at time {t:.9g}")
     why = _PLAIN.get(code, f"evaluation failed with code {code}")
     raise SolverError(f"{why} at time {t:.9g}")
+
+
+def _not_repeated(system: System, t: float) -> str:
+    """Return what is said where f is no function of time and state."""
+    users = [
+        f"Force_Contact[{element}]: {user.name} of {user.source}"
+        for element, user in system.user_friction.items()
+        if not user.compiled
+    ]
+    whose = f" ({'; '.join(users)})" if users else ""
+    return (
+        f"at time {t:.9g} forces are others each time they are asked for at the same time and "
+        f"state: a user's function{whose} takes something else than its arguments, as chance or a "
+        "clock. An implicit method has nothing to solve then: take VERLET or DOPRI5. Results up to "
+        "there are kept."
+    )
 
 
 def _jammed(system: System, row: int, t: float) -> str:

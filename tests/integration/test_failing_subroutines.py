@@ -11,6 +11,7 @@ from click.testing import CliRunner
 
 import mbsim
 from helpers.decks import GRAVITY, GROUND, contact, run_deck, sphere, write_deck
+from helpers.folders import MODELS
 from helpers.libraries import compiled, need
 from mbsim.cli.main import main
 from mbsim.errors import PluginError, SolverError
@@ -256,3 +257,28 @@ def test_a_library_that_would_end_the_process_is_warned_of(tmp_path, language, t
     for line in said:
         assert ": warning: " in line
         assert name in line.split("which ends")[0]
+
+
+CHANCE = """
+import random
+
+chance = random.Random(1)
+
+
+def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):
+    mu, v = 0.1 + 0.1 * chance.random(), (xdot[0] ** 2 + xdot[1] ** 2) ** 0.5
+    part = mu * nforce / max(v, 0.02)
+    return [-part * xdot[0], -part * xdot[1], 0.0]
+"""
+
+
+@pytest.mark.parametrize("method", ["RADAU5", "GALPHA"])
+def test_implicit_methods_say_so_where_friction_is_chance(method, tmp_path):
+    """There is no equation to solve: steps fell to 1e-9 and went on, for ever."""
+    plugin = tmp_path / "chance.py"
+    plugin.write_text(CHANCE)
+    deck = (MODELS / "bowling_ball.xml").read_text()
+    path = tmp_path / "deck.xml"
+    path.write_text(deck.replace("../userfuncs/coulomb_stribeck.py", "chance.py"))
+    with pytest.raises(SolverError, match=r"each time they are asked for.*chance"):
+        mbsim.simulate(mbsim.read_model(path), integrator=method, plugins=[plugin])
