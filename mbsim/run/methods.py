@@ -235,6 +235,8 @@ class Methods:
             now = memory[scheme.TIME]
             said = f"time {now:.9g}: not stiff any more: {catalog.EXPLICIT} from here on"
         memory[scheme.STIFF] = float(stiff)
+        # what was stiff may be so again: what explicit steps amplify beyond their bound is felt then
+        memory[scheme.BOUNDED] = 1.0
         memory[scheme.FRESH] = 1.0
         memory[scheme.ERROR_BEFORE] = 1.0
         memory[scheme.GROWTH] = math.inf
