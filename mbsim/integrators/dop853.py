@@ -20,7 +20,6 @@ from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1, F2, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import POSITION, RATES, STATE, VELOCITY, Problem
-from mbsim.integrators.dopri5 import rate_between
 from mbsim.integrators.positions import has_positions
 from mbsim.integrators.scheme import (
     EVALUATIONS,
@@ -37,6 +36,7 @@ from mbsim.integrators.scheme import (
     interpolate,
     project,
 )
+from mbsim.integrators.stability import rate_between
 
 
 def _table(width: int, *rows: Any) -> F2:

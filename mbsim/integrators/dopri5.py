@@ -8,18 +8,15 @@ that stays true with constraints.
 
 from __future__ import annotations
 
-import math
-
 from mbsim.core.address import call_float, call_int
-from mbsim.core.arrays import F2, Pointer
+from mbsim.core.arrays import Pointer
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import EACH, POSITION, RATES, STATE, Problem
+from mbsim.core.problem import POSITION, RATES, STATE, Problem
 from mbsim.integrators.positions import has_positions
 from mbsim.integrators.scheme import (
     EVALUATIONS,
     KEEPS_TO_BOUND,
     LAST_ERROR,
-    OWN_TIME,
     STIFFNESS,
     TOL,
     WATCH,
@@ -28,6 +25,7 @@ from mbsim.integrators.scheme import (
     in_workspace,
     project,
 )
+from mbsim.integrators.stability import DIFFERENCES, rate_between
 
 C2, C3, C4, C5 = 1 / 5, 3 / 10, 4 / 5, 8 / 9
 A21 = 1 / 5
@@ -47,12 +45,6 @@ E1, E3, E4, E5, E6, E7 = (
 )
 D1, D3, D4 = -12715105075 / 11282082432, 87487479700 / 32700410799, -10690763975 / 1880347072
 D5, D6, D7 = 701980252875 / 199316789632, -1453857185 / 822651844, 69997945 / 29380423
-
-#: Of k, for AUTO: the first row behind the stages, which hold differences between them.
-DIFFERENCES = 7
-#: From so many times the change of f over a step, between its last two stages, a rate is hidden,
-#: if the estimate is below what shows it and the error, over the allowed one, bounds the step.
-HIDES, SHOWN, BOUNDS = 4.0, 1.5, 0.01
 
 
 @jitable
@@ -108,18 +100,6 @@ def attempt(p: Problem, m: Method, t: float, h: float) -> int:
 
 
 @jitable
-def rate_of(moved: float, faster: float, pulled: float) -> float:
-    """Return the rate r with r^2 |dx| + r |dv| = |da| between two states, 0 where da is 0.
-
-    Of a = -w^2 x - c v it is at most w or c, whichever is larger, whatever the units are: where dx
-    or dv alone was compared with da it would be anything between nothing and w^2.
-    """
-    if not pulled > 0.0:
-        return 0.0
-    return 2.0 * pulled / (faster + math.sqrt(faster * faster + 4.0 * moved * pulled))
-
-
-@jitable
 def fill_differences(m: Method, h: float) -> None:
     """Write what `stiffness` is told by behind the stages.
 
@@ -163,22 +143,6 @@ def stiffness(p: Problem, m: Method, t: float, h: float) -> float:
     """
     fill_differences(m, h)
     return rate_between(p, m, t, h, m.k[DIFFERENCES:])
-
-
-@jitable
-def rate_between(p: Problem, m: Method, t: float, h: float, size: F2) -> float:
-    """Return h times the larger rate of two pairs of stages, inf where it is hidden.
-
-    `size` has, in its rows, shifts, changes of velocity and of f of either pair, and the change of
-    f over the step.
-    """
-    # in the norm of the error, which has no units
-    call_float(p.norm, (p.context, t, EACH, size[0], m.y))
-    rate, own = 0.0, m.memory[OWN_TIME]
-    for j in (0, 3):
-        rate = max(rate, rate_of(own * size[j, 0], size[j + 1, 0], size[j + 2, 0]))
-    hidden = size[2, 0] > HIDES * size[6, 0] and m.memory[LAST_ERROR] > BOUNDS
-    return math.inf if hidden and h * rate < SHOWN else h * rate
 
 
 @jitable

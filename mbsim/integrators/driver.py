@@ -45,7 +45,7 @@ from mbsim.integrators.control import (
     smallest_step,
     starting_step,
 )
-from mbsim.integrators.newton import ask_again
+from mbsim.integrators.newton import check_repeats
 from mbsim.integrators.positions import jumps
 from mbsim.integrators.scheme import (
     AFTER_REJECTION,
@@ -197,7 +197,7 @@ def reject(p: Problem, m: Method, t: float, h: float, reason: int, cut_from: flo
     code = call_int(p.reject, (p.context, t, float(reason), m.y, m.error))
     if code != 0:
         note_failure(m, code)
-    ask_again(p, m, t, h)
+    check_repeats(p, m, t, h)
     m.memory[STEP] = h
     m.memory[CUT_FROM] = cut_from
 

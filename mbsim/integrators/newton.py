@@ -48,7 +48,7 @@ LEAST_REST = 0.05
 HALF, QUARTER = 0.5, 0.25
 #: Every so many rejections of steps below this part of the problem's own time it is asked whether f
 #: is a function at all.
-SMALL, ASK_AGAIN = 1e-4, 16
+SMALL, REJECTIONS = 1e-4, 16
 
 
 @jitable
@@ -206,12 +206,12 @@ def repeats(p: Problem, m: Method, t: float) -> bool:
 
 
 @jitable
-def ask_again(p: Problem, m: Method, t: float, h: float) -> None:
+def check_repeats(p: Problem, m: Method, t: float, h: float) -> None:
     """Fail where steps of an implicit method fall because f is no function, h being the next one.
 
     AUTO is spared: it goes on with its explicit method.
     """
     small = m.memory[FACTORED_STEP] > 0.0 and h < SMALL * m.memory[OWN_TIME]
-    if small and m.memory[WATCH] == 0.0 and m.counts[REJECTED] % ASK_AGAIN == 0:
+    if small and m.memory[WATCH] == 0.0 and m.counts[REJECTED] % REJECTIONS == 0:
         if not repeats(p, m, t):
             note_failure(m, Code.NOT_REPEATED)

@@ -15,7 +15,6 @@ from numba import types
 from mbsim.core.address import call_float, call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import EACH, POSITION, RATES, Problem
-from mbsim.integrators.dopri5 import DIFFERENCES, rate_of
 from mbsim.integrators.scheme import (
     EVALUATIONS,
     OWN_TIME,
@@ -25,6 +24,7 @@ from mbsim.integrators.scheme import (
     in_workspace,
     project,
 )
+from mbsim.integrators.stability import DIFFERENCES, rate_of
 
 #: Of `serve`: context, time.
 ASKED = types.float64(types.int64, types.float64)

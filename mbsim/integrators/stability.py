@@ -10,10 +10,17 @@ found by trying: a window of the other kind, now and then.
 
 from __future__ import annotations
 
+import math
+
+from mbsim.core.address import call_float
+from mbsim.core.arrays import F2
 from mbsim.core.jitable import jitable
+from mbsim.core.problem import EACH, Problem
 from mbsim.integrators.scheme import (
     EVALUATIONS,
     FREE,
+    LAST_ERROR,
+    OWN_TIME,
     PACE_FREE,
     PACE_WITHIN,
     STEP,
@@ -27,6 +34,8 @@ from mbsim.integrators.scheme import (
     Method,
 )
 
+#: Of DOPRI5's k: the first row behind the stages, which hold differences between them.
+DIFFERENCES = 7
 #: From here on a step is at the stability bound; as long as this it stays within.
 BOUND, WITHIN = 1.6, 1.8
 #: A step below this error, over the allowed one, moves nothing that the rate could be of.
@@ -37,6 +46,38 @@ NOTHING = 1e-10
 WINDOW, STIFF_PART, SOON, AGAIN = 250, 0.1, 12, 40
 #: Steps within the bound are taken though they go by so much less far: they shake nothing.
 CALMER = 0.5
+
+#: From so many times the change of f over a step, between its last two stages, a rate is hidden,
+#: if the estimate is below what shows it and the error, over the allowed one, bounds the step.
+HIDES, SHOWN, BOUNDS = 4.0, 1.5, 0.01
+
+
+@jitable
+def rate_of(moved: float, faster: float, pulled: float) -> float:
+    """Return the rate r with r^2 |dx| + r |dv| = |da| between two states, 0 where da is 0.
+
+    Of a = -w^2 x - c v it is at most w or c, whichever is larger, whatever the units are: where dx
+    or dv alone was compared with da it would be anything between nothing and w^2.
+    """
+    if not pulled > 0.0:
+        return 0.0
+    return 2.0 * pulled / (faster + math.sqrt(faster * faster + 4.0 * moved * pulled))
+
+
+@jitable
+def rate_between(p: Problem, m: Method, t: float, h: float, size: F2) -> float:
+    """Return h times the larger rate of two pairs of stages, inf where it is hidden.
+
+    `size` has, in its rows, shifts, changes of velocity and of f of either pair, and the change of
+    f over the step.
+    """
+    # in the norm of the error, which has no units
+    call_float(p.norm, (p.context, t, EACH, size[0], m.y))
+    rate, own = 0.0, m.memory[OWN_TIME]
+    for j in (0, 3):
+        rate = max(rate, rate_of(own * size[j, 0], size[j + 1, 0], size[j + 2, 0]))
+    hidden = size[2, 0] > HIDES * size[6, 0] and m.memory[LAST_ERROR] > BOUNDS
+    return math.inf if hidden and h * rate < SHOWN else h * rate
 
 
 @jitable

@@ -214,9 +214,11 @@ class Methods:
         if not stiff:
             took = IMPLICIT_START + IMPLICIT_WORK * (work - self._since[1])
             instead = EVALUATIONS_A_STEP * memory[scheme.COSTLY] * (now - self._since[0])
-            factor = min(MOST_LEARNT, max(1.0 / 1.5, (took / instead) ** 2))
+            # a stay that took no time says nothing
+            over = took / instead if instead > 0.0 else 1.0
+            factor = min(MOST_LEARNT, max(1.0 / 1.5, over**2))
             # with fewer explicit steps a time it does not pay
-            memory[scheme.COSTLY] *= max(1.0, took / instead)
+            memory[scheme.COSTLY] *= max(1.0, over)
             memory[scheme.PATIENCE] = max(FIRST_PATIENCE, factor * memory[scheme.PATIENCE])
         elif self.changes > 0:
             free = memory[scheme.EXPLICIT_STEPS] - memory[scheme.STIFF_STEPS]
@@ -235,7 +237,7 @@ class Methods:
             now = memory[scheme.TIME]
             said = f"time {now:.9g}: not stiff any more: {catalog.EXPLICIT} from here on"
         memory[scheme.STIFF] = float(stiff)
-        # what was stiff may be so again: what explicit steps amplify beyond their bound is felt then
+        # what was stiff may be so again: what explicit steps amplify beyond their bound is felt
         memory[scheme.BOUNDED] = 1.0
         memory[scheme.FRESH] = 1.0
         memory[scheme.ERROR_BEFORE] = 1.0

@@ -147,7 +147,7 @@ def test_a_resumed_run_gives_up_where_the_straight_one_does(tmp_path, monkeypatc
 
 
 @pytest.mark.parametrize("calls", [3, 12, 40])
-@pytest.mark.parametrize("deck", ["rolling_sphere", "box_stack", "incline_creep"])
+@pytest.mark.parametrize("deck", ["jammed_wedge", "box_stack", "incline_creep"])
 def test_a_run_that_ends_while_auto_may_go_back_goes_on_as_if_it_had_not(
     deck, calls, tmp_path, monkeypatch
 ):

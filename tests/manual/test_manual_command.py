@@ -186,7 +186,8 @@ def test_html_is_one_file(tmp_path):
     result = CliRunner().invoke(main, ["manual", "--html", str(file)])
     assert result.exit_code == 0, result.output
     text = file.read_text(encoding="utf-8")
-    assert file.stat().st_size < 3_000_000
+    # pictures of a gallery are in it
+    assert file.stat().st_size < 4_000_000
     # nothing is loaded from elsewhere, and every link within leads to an id
     assert not re.search(r'(?:src|href)="(?!#|data:|https?://|mailto:)', text)
     assert not re.search(r'<(?:script|link|img)[^>]*(?:src|href)="https?:', text)

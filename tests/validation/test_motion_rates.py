@@ -153,15 +153,9 @@ JUMP = """
 """
 
 
-@pytest.mark.parametrize(
-    ("method", "where"),
-    [
-        ("AUTO", r"Motion_Joint\[1\]"),  # which asks for the jump
-        *((method, r"Body_Rigid\[2\]") for method in ("DOPRI5", "RADAU5", "GALPHA")),
-    ],
-)
-def test_a_jump_of_a_velocity_stops_every_method(tmp_path, method, where):
+@pytest.mark.parametrize("method", ["AUTO", "DOPRI5", "RADAU5", "GALPHA"])
+def test_a_jump_of_a_velocity_stops_every_method(tmp_path, method):
     """It takes a force without bound: RADAU5, whose stages are projected, ran through it."""
     model = mbsim.read_model(write_deck(tmp_path, JUMP))
-    with pytest.raises(SolverError, match=rf"at time 0\.503 .*{where}"):
+    with pytest.raises(SolverError, match=r"at time 0\.503 .*Motion_Joint\[1\]"):
         mbsim.simulate(model, integrator=method)
