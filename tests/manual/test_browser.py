@@ -80,7 +80,7 @@ def _browse(folder, *arguments):
     """Run the browser without a window and with a profile of its own."""
     common = ("--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder}")
     done = subprocess.run(
-        [BROWSER, *common, "--window-size=1280,900", "--virtual-time-budget=20000", *arguments],
+        [BROWSER, *common, "--window-size=1280,900", "--virtual-time-budget=200000", *arguments],
         capture_output=True,
         text=True,
         timeout=300,
