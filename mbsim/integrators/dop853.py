@@ -36,7 +36,7 @@ from mbsim.integrators.scheme import (
     interpolate,
     project,
 )
-from mbsim.integrators.stability import rate_between
+from mbsim.integrators.stability import clear_differences, note_difference, rate_between
 
 
 def _table(width: int, *rows: Any) -> F2:
@@ -251,9 +251,7 @@ def stiffness(p: Problem, m: Method, t: float, h: float) -> float:
     """
     k, n = m.k, len(m.y)
     d, first = k[DIFFERENCES:], not has_positions(m)
-    for j in range(RATES):
-        for i in range(n):
-            d[j, i] = 0.0
+    clear_differences(m, d)
     for i in range(n):
         if m.kinds[i] == STATE and not first:
             continue
@@ -261,12 +259,7 @@ def stiffness(p: Problem, m: Method, t: float, h: float) -> float:
         for s in range(12):
             shift += (A[12, s] - A[11, s]) * k[s, i]
             come += (A[11, s] - A[10, s]) * k[s, i]
-        is_rate = m.kinds[i] != POSITION
-        j = 1 if is_rate else 0
-        d[j, i], d[3 + j, i] = h * shift, h * come
-        if is_rate:
-            d[2, i], d[5, i] = k[12, i] - k[11, i], k[11, i] - k[10, i]
-            d[6, i] = k[12, i] - k[0, i]
+        note_difference(m, d, i, h * shift, h * come, 12)
     return (3.3 / 6.1) * rate_between(p, m, t, h, d)
 
 

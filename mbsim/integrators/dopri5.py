@@ -11,7 +11,7 @@ from __future__ import annotations
 from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import Pointer
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import POSITION, RATES, STATE, Problem
+from mbsim.core.problem import RATES, STATE, Problem
 from mbsim.integrators.positions import has_positions
 from mbsim.integrators.scheme import (
     EVALUATIONS,
@@ -25,7 +25,12 @@ from mbsim.integrators.scheme import (
     in_workspace,
     project,
 )
-from mbsim.integrators.stability import DIFFERENCES, rate_between
+from mbsim.integrators.stability import (
+    DIFFERENCES,
+    clear_differences,
+    note_difference,
+    rate_between,
+)
 
 C2, C3, C4, C5 = 1 / 5, 3 / 10, 4 / 5, 8 / 9
 A21 = 1 / 5
@@ -107,9 +112,7 @@ def fill_differences(m: Method, h: float) -> None:
     """
     k, d, n = m.k, m.k[DIFFERENCES:], len(m.y)
     first = not has_positions(m)
-    for j in range(RATES):
-        for i in range(n):
-            d[j, i] = 0.0
+    clear_differences(m, d)
     for i in range(n):
         if m.kinds[i] == STATE and not first:
             continue
@@ -117,13 +120,7 @@ def fill_differences(m: Method, h: float) -> None:
         shift += (B5 - A65) * k[4, i] + B6 * k[5, i] - A62 * k[1, i]
         come = (A61 - A51) * k[0, i] + (A62 - A52) * k[1, i] + (A63 - A53) * k[2, i]
         come += (A64 - A54) * k[3, i] + A65 * k[4, i]
-        # f of a position is its velocity: that says nothing
-        is_rate = m.kinds[i] != POSITION
-        j = 1 if is_rate else 0
-        d[j, i], d[3 + j, i] = h * shift, h * come
-        if is_rate:
-            d[2, i], d[5, i] = k[6, i] - k[5, i], k[5, i] - k[4, i]
-            d[6, i] = k[6, i] - k[0, i]
+        note_difference(m, d, i, h * shift, h * come, 6)
 
 
 @jitable

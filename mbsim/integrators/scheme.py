@@ -99,9 +99,9 @@ HELD = 59
 # of an explicit method alone (`stability.py`): whether it looks at its bound of stability, and goes
 # beyond; how far both kinds of steps go for an evaluation, 0 for unknown; of the window of steps:
 # how many, and at the bound, time and evaluations at its begin; windows since the kind was chosen
-KEEPS_TO_BOUND, FREE, PACE_FREE, PACE_WITHIN = range(62, 66)
-WINDOW_STEPS, WINDOW_STIFF, WINDOW_TIME, WINDOW_WORK, WINDOWS = range(66, 71)
-MEMORY = 71
+KEEPS_TO_BOUND, FREE, PACE_FREE, PACE_WITHIN = range(60, 64)
+WINDOW_STEPS, WINDOW_STIFF, WINDOW_TIME, WINDOW_WORK, WINDOWS = range(64, 69)
+MEMORY = 69
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)

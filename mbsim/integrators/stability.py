@@ -1,11 +1,11 @@
-"""How an explicit method that runs alone keeps to its bound of stability.
+"""The rates that stages of an explicit method show, and how its steps keep to their stability.
 
-The error lets steps beyond that bound pass as long as what they amplify is within the tolerance.
-What is amplified is then rejected, or shaken: friction that turns sign from step to step, what
-rests that trembles. Steps within the bound are mostly fewer in all, and a looser tolerance takes no
-more of them. Not where friction shakes within a loose tolerance and the motion hardly sees it:
-there steps that are many times as long go on. Which of the two goes farther for its evaluations is
-found by trying: a window of the other kind, now and then.
+The error lets steps beyond the bound of stability pass as long as what they amplify is within the
+tolerance. What is amplified is then rejected, or shaken: friction that turns sign from step to
+step, what rests that trembles. Where a method runs alone, steps within the bound are mostly fewer
+in all, and a looser tolerance takes about as many. Not where friction shakes within a loose
+tolerance and the motion hardly sees it: there steps that are many times as long go on. Which of the
+two goes farther for its evaluations is found by trying: a window of the other kind, now and then.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import math
 from mbsim.core.address import call_float
 from mbsim.core.arrays import F2
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import EACH, Problem
+from mbsim.core.problem import EACH, POSITION, RATES, Problem
 from mbsim.integrators.scheme import (
     EVALUATIONS,
     FREE,
@@ -62,6 +62,30 @@ def rate_of(moved: float, faster: float, pulled: float) -> float:
     if not pulled > 0.0:
         return 0.0
     return 2.0 * pulled / (faster + math.sqrt(faster * faster + 4.0 * moved * pulled))
+
+
+@jitable
+def clear_differences(m: Method, d: F2) -> None:
+    """Set all of `d` to 0: what is no difference between stages counts nothing."""
+    for j in range(RATES):
+        for i in range(len(m.y)):
+            d[j, i] = 0.0
+
+
+@jitable
+def note_difference(m: Method, d: F2, i: int, shift: float, come: float, last: int) -> None:
+    """Write into `d` what `rate_between` compares of y[i]; k[last] is f at the trial point.
+
+    `shift` is from the stage before to the trial point, `come` from the one before that stage.
+    """
+    k = m.k
+    # f of a position is its velocity: that says nothing
+    is_rate = m.kinds[i] != POSITION
+    j = 1 if is_rate else 0
+    d[j, i], d[3 + j, i] = shift, come
+    if is_rate:
+        d[2, i], d[5, i] = k[last, i] - k[last - 1, i], k[last - 1, i] - k[last - 2, i]
+        d[6, i] = k[last, i] - k[0, i]
 
 
 @jitable
