@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import IO, Any, final
+from typing import IO, Any, cast, final
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
@@ -341,7 +341,8 @@ def _method(name: str, statement: Statement) -> Callable[..., Element]:
 
     add.__name__, add.__qualname__ = name, f"Model.{name}"
     add.__doc__ = about(statement)
-    add.__signature__ = signature(statement)  # type: ignore[attr-defined]
+    # `inspect.signature` reads it; functions do not declare it
+    cast(Any, add).__signature__ = signature(statement)
     return add
 
 

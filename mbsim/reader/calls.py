@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import keyword
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from mbsim.errors import ModelError
@@ -134,9 +134,9 @@ def parts(statement: Statement, name: str, value: object) -> dict[str, object]:
     ``pos=(1, 2, 3)`` is pos_x, pos_y and pos_z, ``scale=`` x_scale and so on, ``inertia=`` the
     three moments, or these and the products xy, yz and xz.
     """
-    if isinstance(value, str) or not hasattr(value, "__len__"):
+    if isinstance(value, str) or not isinstance(value, Collection):
         return {}
-    values = list(value)  # type: ignore[call-overload]
+    values: list[object] = list(value)
     for endings, form in ((_AXES, "{0}_{1}"), (_AXES, "{1}_{0}"), (_SQUARES, "{0}_{1}")):
         names = [form.format(name, ending) for ending in endings]
         if all(each in statement.attributes for each in names):
