@@ -27,7 +27,7 @@ class Code(IntEnum):
     NOT_CONVERGED = 50  # an implicit method's equations of a step: a shorter one is tried
     SINGULAR = 51  # `factor`: there is no solution, or too many
     STOPPED_BY_USER = 100
-    NOT_REPEATED = 101  # f at a point is another each time it is asked for
+    NOT_REPEATED = 101  # f at a point differs each time it is asked for
 
 
 #: Codes from here on end the run without another try.

@@ -173,8 +173,8 @@ def _not_repeated(system: System, t: float) -> str:
     ]
     whose = f" ({'; '.join(users)})" if users else ""
     return (
-        f"at time {t:.9g} forces are others each time they are asked for at the same time and "
-        f"state: a user's function{whose} takes something else than its arguments, as chance or a "
+        f"at time {t:.9g} forces differ each time they are asked for at the same time and "
+        f"state: a user's function{whose} depends on more than its arguments, as on chance or a "
         "clock. An implicit method has nothing to solve then: take VERLET or DOPRI5. Results up to "
         "there are kept."
     )
