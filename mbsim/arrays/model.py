@@ -149,6 +149,7 @@ class Switching(NamedTuple):
     program: I1  # (n,) that tells the sides of an expression's switches, -1 for a force
     force: I1  # (n,) row of `Applied`, -1 for an expression; the last may have neither: it is
     # for what all incidents do whose friction has modes
+    jumps: I1  # (n,) 1 where the value of the expression may jump, not only its slope
 
 
 @tags.constant

@@ -13,13 +13,15 @@ differs where a branch does:
 | AINT(x), ANINT(x)   | sin(pi x), cos(pi x)                                                  |
 | STEP, STEP5, HAVSIN | x - x0, x - x1                                                        |
 | SWEEP               | the same, and x - x0 - dx                                             |
+| ATAN2, PSI, PHI, YAW, ROLL | themselves where they are more than pi/2 off 0: from pi to -pi  |
 | IMPACT, BISTOP      | depth d; with a damper d - dmax, and what the force is without its bound |
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import islice
 
 import numpy as np
 
@@ -39,6 +41,11 @@ LONGEST = 2000
 
 #: A user's function is not to be asked more often than forces are; forces are not known yet.
 _NOT_ASKED = (USER, NET, ELEMENT)
+
+#: Angles that go from pi to -pi; others are counted on.
+_ANGLES = ("ATAN2", "PSI", "PHI", "YAW", "ROLL")
+#: What may jump at its switch.
+_JUMPS = frozenset(("IF", "SIGN", "MOD", "AINT", "ANINT", *_ANGLES))
 
 _NAUGHT = Number(0.0)
 
@@ -75,6 +82,9 @@ def _of_call(node: Call) -> Iterator[Node]:
         yield _call("SIN", _call("MUL", Number(math.pi), _call("DIV", *x)))
     elif name in ("AINT", "ANINT"):
         yield _call("SIN" if name == "AINT" else "COS", _call("MUL", Number(math.pi), x[0]))
+    elif name in _ANGLES:
+        behind = _call("SUB", _call("ABS", node), Number(0.5 * math.pi))
+        yield _call("IF", behind, Number(-1.0), node, node)
     elif name in ("STEP", "STEP5", "HAVSIN"):
         yield from (_call("SUB", x[0], x[1]), _call("SUB", x[0], x[3]))
     elif name == "SWEEP":
@@ -87,9 +97,12 @@ def _of_call(node: Call) -> Iterator[Node]:
         yield from _stop(_call("SUB", x[0], x[3]), x[1], x[4:8])
 
 
-def switches(root: Node, variables: Mapping[int, Expression]) -> list[Node]:
-    """Return the switches of an expression and of the variables that it uses, each once."""
-    found: dict[Node, None] = {}
+def switches(root: Node, variables: Mapping[int, Expression]) -> dict[Node, bool]:
+    """Return the switches of an expression and of the variables that it uses, each once.
+
+    Each with whether the value may jump there, not only its slope.
+    """
+    found: dict[Node, bool] = {}
     waiting, seen = [root], set[int]()
     while waiting:
         node = waiting.pop()
@@ -102,15 +115,15 @@ def switches(root: Node, variables: Mapping[int, Expression]) -> list[Node]:
                 waiting.append(variables[id].root)
             continue
         for switch in _of_call(node):
-            found[switch] = None
+            found[switch] = found.get(switch, False) or node.name in _JUMPS
         waiting.extend(node.args)
-    return list(found)
+    return found
 
 
-def _sides(found: list[Node]) -> Node:
+def _sides(found: Iterable[Node]) -> Node:
     """Return the expression whose value tells the sides of all switches."""
     total: Node = _NAUGHT
-    for k, switch in enumerate(found[:MOST_SWITCHES]):
+    for k, switch in enumerate(islice(found, MOST_SWITCHES)):
         bit = _call("IF", switch, _NAUGHT, _NAUGHT, Number(2.0**k))
         total = bit if k == 0 else _call("ADD", total, bit)
     return total
@@ -147,7 +160,7 @@ def switching_table(
     elements.
     """
     variables = {id: v.expr for id, v in model.variables.items() if v.user is None}
-    rows, any_found = [], any(s.changes for s in model.simulations)
+    rows, jumps, any_found = [], [], any(s.changes for s in model.simulations)
     still = [Instruction(NUMBER, value=0.0)]
     for expression in _acting(model):
         found = switches(expression.root, variables)
@@ -157,8 +170,9 @@ def switching_table(
             programs.programs[row] = made = still
         any_found = any_found or len(made) > 1
         rows.append(row)
+        jumps.append(1 if any(found.values()) else 0)
     if not any_found:
-        rows = []
+        rows, jumps = [], []
     rows += modes
     forms = [FORCES[name].form for name, _ in applied]
     branched = [f for f, form in enumerate(forms) if isinstance(form, Switched)]
@@ -166,4 +180,5 @@ def switching_table(
     return Switching(
         np.array([*rows, *(-1 for _ in branched), *last], dtype=np.int64),
         np.array([*(-1 for _ in rows), *branched, *last], dtype=np.int64),
+        np.array([*jumps, *(0 for _ in (*modes, *branched, *last))], dtype=np.int64),
     )

@@ -86,7 +86,11 @@ def first_switch(p: Problem, m: Method, t: float, h: float, whole: float, behind
     farther = FARTHER ** max(0.0, m.memory[VAIN] - 1.0)
     low, high, near = NEAR_SWITCH, behind, NEAR_SWITCH * farther
     if near < behind:
-        side_at(p, m, t, h, low, SETTLE)
+        interpolate(m, low, m.error)
+        if ask_switching(p, m, t + low * h, ASK, m.error, m.error) > 1:
+            behind = high = low
+        else:
+            side_at(p, m, t, h, low, SETTLE)
     if behind < 1.0:
         interpolate(m, behind, m.error)
         differs = ask_switching(p, m, t + behind * h, ASK, m.error, m.error)

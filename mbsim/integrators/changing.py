@@ -44,6 +44,7 @@ from mbsim.integrators.scheme import (
     COSTLY,
     EVALUATIONS,
     EXPLICIT_STEPS,
+    FIRST_MAX,
     IMPLICIT_STEPS,
     JACOBIANS,
     LAST_ERROR,
@@ -151,7 +152,10 @@ def begins_stiff(m: Method, steps: Steps, t_end: float) -> bool:
     if not WORTH_AT_ONCE * WITHIN < rate * (t_end - t) < math.inf:
         return False
     # the steps that stability would bound: shorter ones of a transient are good for either method
-    m.memory[STEP], m.memory[PACE] = WITHIN / rate, rate / WITHIN
+    m.memory[PACE] = rate / WITHIN
+    # where a force jumps the first step is tiny, with either method
+    most = m.memory[FIRST_MAX] if m.memory[FIRST_MAX] > 0.0 else math.inf
+    m.memory[STEP] = min(WITHIN / rate, most)
     m.memory[STIFF_STEPS] = m.memory[PATIENCE]
     return True
 

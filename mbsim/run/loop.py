@@ -286,7 +286,7 @@ class Runner:
     def _begin_stage(self, stage: Stage) -> bool:
         """Begin one Simulate statement with its first row; return whether it goes on."""
         from mbsim.integrators import scheme
-        from mbsim.run.start import assemble_again
+        from mbsim.run.start import assemble_again, limit_first
         from mbsim.run.statics import balance_bodies
 
         method, simulation = self.method, stage.simulation
@@ -309,6 +309,8 @@ class Runner:
             goes_on = False
         elif self._interrupts(self.stage):
             assemble_again(self.system, self.hooks, t, method.y)
+        if goes_on and self.methods.explicit.order > 0.0:
+            limit_first(self.system, self.hooks, t, method, self._say)
         if (
             goes_on
             and self.problem.arrive

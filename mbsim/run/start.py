@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from mbsim.errors import ModelError
 from mbsim.geometry.catalog import AT_DEPTH
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
     from mbsim.dynamics.initial.assembly import Assembly
+    from mbsim.integrators.scheme import Method
     from mbsim.run.hook_calls import HookCalls
     from mbsim.run.settings import Settings
 
@@ -18,6 +21,12 @@ Tell = Callable[[str], None]
 
 #: Of the smaller shape's size: shapes that touch overlap by so much from rounding.
 _ROUNDING = 1e-12
+#: Whether a force jumps behind the start is asked so far ahead, in parts of the model's own time.
+_AHEAD = (1e-4, 1e-5)
+#: It does where so much of the change is left from the one to the other, and is so much of itself.
+_STAYS, _COUNTS = 0.5, 1e-3
+#: The first step there, in the same parts.
+_FIRST = 1e-9
 
 
 def assemble_model(
@@ -168,3 +177,76 @@ def overlaps(system: System, log: Tell, tell: Tell) -> list[str]:
                 f"at the start, more than {limit:.6g}; move them apart or give --allow-overlap"
             )
     return faults
+
+
+def jumping_forces(system: System, hooks: HookCalls, t: float, y: Any, own: float) -> list[str]:
+    """Return what to say of each expression's or subroutine's force that jumps behind the start.
+
+    As of an angle that has no value where the bodies stand: the motion's first instant decides
+    which it gets. Such a place is left along another way from another first step, so that no
+    tolerance tells how far off it is.
+
+    Parameters
+    ----------
+    system : System
+    hooks : HookCalls
+    t : float
+        Time of the start [T].
+    y : ndarray (n,)
+        State there.
+    own : float
+        The model's own time [T].
+
+    Returns
+    -------
+    list of str
+        A line for each element.
+    """
+    from mbsim.model.names import element_name
+    from mbsim.results.elements import GROUPS
+
+    applied, work = system.scene.applied, system.scene.work
+    rows = np.flatnonzero((applied.program >= 0) | (applied.components >= 0).any(axis=1))
+    if not len(rows):
+        return []
+    rhs, slope, there = hooks.problem.rhs, np.zeros(len(y)), np.zeros(len(y))
+
+    def forces_at(point: Any, into: Any) -> Any:
+        hooks.must(rhs, t, point, into)
+        return work.applied[rows, :6].copy()
+
+    begin, changes = forces_at(y, slope), []
+    for part in _AHEAD:
+        # two stages: bodies that rest leave along their acceleration
+        forces_at(y + part * own * slope, there)
+        changes.append(forces_at(y + 0.5 * part * own * (slope + there), there) - begin)
+    forces_at(y, slope)
+    far, near = changes
+    size = np.abs(begin) + np.abs(near)
+    # forces and torques have units of their own
+    size = np.maximum.reduceat(size, [0, 3], axis=1).repeat(3, axis=1)
+    jumps = (np.abs(near) > _STAYS * np.abs(far)) & (np.abs(near) > _COUNTS * size)
+    lines = []
+    for k in np.flatnonzero(jumps.any(axis=1)):
+        statement, id = system.applied[rows[k]]
+        name = element_name(system.model.file, GROUPS[statement].title, id)
+        c = int(np.argmax(np.abs(near[k]) * jumps[k]))
+        lines.append(
+            f"{name}: its {'force' if c < 3 else 'torque'} along global {'xyz'[c % 3]} "
+            f"jumps just behind the start, time {t:.6g}, from {begin[k, c]:.4g} to "
+            f"{begin[k, c] + near[k, c]:.4g}: what it looks at has no one value there; the run "
+            "begins with a tiny step, but where it goes may depend on what tol does not bound"
+        )
+    return lines
+
+
+def limit_first(system: System, hooks: HookCalls, t: float, method: Method, say: Tell) -> None:
+    """Bound the first step of the method's arrays where a force jumps, and tell `say` of it."""
+    from mbsim.integrators.scheme import FIRST_MAX, OWN_TIME
+
+    memory = method.memory
+    lines = jumping_forces(system, hooks, t, method.y, float(memory[OWN_TIME]))
+    for line in lines:
+        say(f"warning: {line}")
+    if lines:
+        memory[FIRST_MAX] = min(memory[FIRST_MAX] or np.inf, _FIRST * memory[OWN_TIME])

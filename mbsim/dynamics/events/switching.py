@@ -228,7 +228,7 @@ def load(scene: Scene, context: int, t: float, y: F1) -> float:
 
 @jitable
 def watch(scene: Scene, context: int, t: float, y: F1, what: float) -> int:
-    """Return 1 if a side differs from that kept, 2 for dry friction and rigid one, else 0.
+    """Return 1 if a side differs from that kept, 2 where it is to be found exactly, else 0.
 
     Unless it is only asked, the sides are kept. Of a step that was taken: 1 if one changed in it.
     """
@@ -250,12 +250,14 @@ def watch(scene: Scene, context: int, t: float, y: F1, what: float) -> int:
             k == last and f < 0 and scene.switching.program[k] < 0 and leaves_branch(scene)
         )
         leaves = now != scene.state.dry[f, SLIDES] if keeps else exact or other
+        # a jump is found exactly too: what is wrong of one goes with the part of the step
+        jumps = scene.switching.jumps[k] == 1
         if what == PASS:
             differs = 1 if other else differs
         elif leaves and sides[k, CHATTERING] <= (
             CHATTERS if k < last or f >= 0 else CHATTERS_MODES
         ):
-            differs = max(differs, 2 if exact else 1)
+            differs = max(differs, 2 if exact or jumps else 1)
         if what == PASS:
             sides[k, CHATTERING] = COOLING * sides[k, CHATTERING] + (1.0 if other else 0.0)
         if what != ASK:
