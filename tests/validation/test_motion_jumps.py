@@ -7,7 +7,7 @@ import pytest
 import mbsim
 from mbsim.errors import SolverError
 
-METHODS = ("AUTO", "DOPRI5", "DOP853", "RADAU5", "GALPHA")
+METHODS = ("AUTO", "DOPRI5", "DOP853", "RADAU5", "GALPHA", "MOREAU")
 
 
 def moved(folder, expression, kind="D"):
