@@ -299,7 +299,7 @@ _put(
     CUBSPL="the same, natural cubic spline",
     LINSPL="the same, straight lines",
 )
-_put(Kind.TABLE, "ARRAY place", None, "id, n", ARYVAL="n-th number of an array, from 1")
+_put(Kind.TABLE, "ARRAY place", None, "id, n", ARYVAL="n-th element of an array, from 1")
 _put(
     Kind.STATE,
     "SENSOR",

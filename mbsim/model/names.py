@@ -24,7 +24,10 @@ ADAMS = {
     "Reference_Spline": "SPLINE",
     "Reference_Array": "ARRAY",
     "Post_Request": "REQUEST",
+    "Reference_Matrix": "MATRIX",
     "Control_Diff": "DIFF",
+    "Control_SISO": "TFSISO",
+    "Control_StateEqn": "LSE",
     "Sensor_Event": "SENSOR",
 }
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from mbsim.errors import Fault
 from mbsim.model import elements as el
+from mbsim.reader.linear_systems import ControlDraft
 from mbsim.reader.parse import Node
 
 
@@ -42,6 +43,7 @@ class Draft:
     differentials: dict[int, el.Differential] = field(default_factory=dict)
     splines: dict[int, el.Spline] = field(default_factory=dict)
     arrays: dict[int, el.ArrayOfNumbers] = field(default_factory=dict)
+    control: ControlDraft = field(default_factory=ControlDraft)
     requests: dict[int, el.Request] = field(default_factory=dict)
     display_graphics: dict[int, str] = field(default_factory=dict)
     points: dict[int, tuple[str, el.Source]] = field(default_factory=dict)  # bodies: point masses

@@ -14,11 +14,14 @@ from mbsim.reader.constraints import (
     MOTION_MARKER,
 )
 from mbsim.reader.contact import FORCE_CONTACT
+from mbsim.reader.control_siso import CONTROL_SISO
+from mbsim.reader.control_state_eqn import CONTROL_STATE_EQN
 from mbsim.reader.controls import CONTROL_DIFF, SENSOR_EVENT
 from mbsim.reader.draft import Draft
 from mbsim.reader.forces import force_statements
 from mbsim.reader.graphics import POST_GRAPHIC
 from mbsim.reader.keywords import fold, nearest
+from mbsim.reader.matrix import REFERENCE_MATRIX
 from mbsim.reader.output_statements import OUTPUT_STATEMENTS
 from mbsim.reader.param_simulation import PARAM_SIMULATION
 from mbsim.reader.parse import Node
@@ -48,8 +51,11 @@ STATEMENTS = (
     *force_statements(),
     REFERENCE_VARIABLE,
     CONTROL_DIFF,
+    CONTROL_SISO,
+    CONTROL_STATE_EQN,
     REFERENCE_SPLINE,
     REFERENCE_ARRAY,
+    REFERENCE_MATRIX,
     SENSOR_EVENT,
     POST_REQUEST,
     SIMULATE,
@@ -64,7 +70,7 @@ _DOCUMENTED = (
     "Activate Body_Flexible Body_Point Constraint_CVCV Constraint_Gear "
     "Constraint_PTCV Constraint_PTdCV "
     "Constraint_PTSF Constraint_UserConstr Control_FMU Control_PlantInput "
-    "Control_PlantOutput Control_SISO Control_StateEqn Control_TransferFunction Deactivate "
+    "Control_PlantOutput Control_SISO Control_StateEqn Deactivate "
     "Force_Beam Force_Field Force_MultiPoint Force_Penalty "
     "Force_StateEqn Force_TwoBody "
     "Param_Linear "
@@ -76,6 +82,7 @@ _DOCUMENTED = (
 NOT_BUILT = [name for name in _DOCUMENTED if fold(name) not in BY_KEY]
 #: Documented statements that mbsim has another way for.
 REFUSED = {
+    "Control_TransferFunction": "MotionSolve's decks have a transfer function as Control_SISO",
     "Load_Command": "a run's commands are those of its deck; write them into this <Command>",
     "Load_Model": "a run is one deck; give the other file to a mbsim run of its own",
     "Save": "the result file keeps the state; a run cut short goes on with mbsim run --resume",

@@ -7,8 +7,20 @@ from collections.abc import Sequence
 
 from mbsim.core.stored import read_regular
 from mbsim.model import elements as el
-from mbsim.reader.kinds import FLAG, REALS, TEXT, BadValueError, keyword, parse_real
+from mbsim.reader.kinds import (
+    COUNT,
+    FLAG,
+    ID,
+    REALS,
+    TEXT,
+    BadValueError,
+    Kind,
+    keyword,
+    parse_real,
+)
+from mbsim.reader.linear_systems import ControlArray
 from mbsim.reader.statement import NAMED, Entry, Spec, Statement
+from mbsim.reader.subroutine import USERSUB
 
 Numbers = tuple[float, ...]
 
@@ -105,15 +117,72 @@ def _build_spline(entry: Entry) -> None:
     add_spline(entry, table[::width], rows, z, name, name)
 
 
-def _build_array(entry: Entry) -> None:
-    """Add an array of numbers."""
-    if entry.get("values") is None:
-        return
-    array = el.ArrayOfNumbers(
-        entry.get("id", 0), entry.get("values"), entry.get("label", ""), entry.source
-    )
-    entry.register(entry.draft.arrays, array)
+def add_array(
+    entry: Entry, type: str, size: int | None, numbers: Numbers, ids: Numbers, names: Sequence[str]
+) -> None:
+    """Add an array of any type.
 
+    `names` are the attributes that give its size, its numbers and, of type U, its variables.
+    """
+    draft, id = entry.draft, entry.get("id", 0)
+    wanted = {"IC": names[1], "U": names[2]}.get(type)
+    for name, values in zip(names[1:], (numbers, ids), strict=True):
+        if values and name != wanted:
+            entry.fault(f"an array of type {type} has none", name)
+            return
+        if name == wanted and not values:
+            what = "numbers" if type == "IC" else "ids of variables"
+            entry.fault(f"{name}: missing; must be {what}, separated by blanks or commas")
+            return
+    values = ids or numbers
+    if wanted and size is not None and size != len(values):
+        entry.fault(f"there are {len(values)} {wanted}", names[0])
+        return
+    other = draft.control.arrays.get(id) if type == "IC" else draft.arrays.get(id)
+    if other is not None:
+        entry.fault(
+            f"id already used on line {other.source.line}; ids are unique per statement", "id"
+        )
+    elif type == "IC":
+        array = el.ArrayOfNumbers(id, numbers, entry.get("label", ""), entry.source)
+        entry.register(draft.arrays, array)
+    else:
+        size = len(ids) if type == "U" else size
+        variables = tuple(map(int, ids))
+        entry.register(draft.control.arrays, ControlArray(id, type, size, variables, entry.source))
+
+
+def _build_array(entry: Entry) -> None:
+    """Add an array; the text of one of type U is the ids of its variables."""
+    type = entry.get("type", "IC")
+    for name in ("type", "values", "variable_id", "num_element"):
+        if entry.given(name) and entry.get(name) is None:
+            return
+    numbers, ids = entry.get("values", ()), entry.get("variable_id", ())
+    if type == "U" and not ids and numbers:
+        if any(number != int(number) or number < 1 for number in numbers):
+            entry.fault("must be ids of variables", "values")
+            return
+        numbers, ids = (), numbers
+    add_array(
+        entry,
+        type,
+        entry.get("num_element"),
+        numbers,
+        ids,
+        ("num_element", "values", "variable_id"),
+    )
+
+
+def _parse_variables(text: str) -> Numbers:
+    """Return ids separated by blanks or commas; one may stand there twice."""
+    words = text.replace(",", " ").split()
+    if not words:
+        raise BadValueError
+    return tuple(ID.parse(word) for word in words)
+
+
+VARIABLES = Kind("ids of variables, separated by blanks or commas", _parse_variables)
 
 REFERENCE_SPLINE = Statement(
     "Reference_Spline",
@@ -135,11 +204,17 @@ REFERENCE_ARRAY = Statement(
     {
         **NAMED,
         "type": Spec(
-            keyword({"ic": "IC"}, {"x": "X", "y": "Y", "u": "U"}), "sort of array", "", "IC"
+            keyword({"ic": "IC", "x": "X", "y": "Y", "u": "U"}), "sort of array", "", "IC"
         ),
-        "values": Spec(REALS, "the numbers; text of the element too", required=True),
+        "num_element": Spec(COUNT, "how many elements it has", "", "as many as there are"),
+        "values": Spec(REALS, "of type IC the numbers; text of the element too"),
+        "variable_id": Spec(VARIABLES, "of type U the variables; as text of the element too"),
+        **{
+            name: Spec(TEXT, refused="ARYSUB is not built; name variables, which may be USERSUB")
+            for name in (*USERSUB, "script_name", "interpreter")
+        },
     },
     _build_array,
     text="values",
-    about="numbers that ARYVAL gives by their place",
+    about="numbers, inputs, states or outputs, by their place in ARYVAL",
 )

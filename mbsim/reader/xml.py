@@ -18,6 +18,7 @@ from mbsim.model.names import is_adams, is_commands
 from mbsim.reader.constraints import complete_motions
 from mbsim.reader.draft import Draft
 from mbsim.reader.keywords import fold
+from mbsim.reader.linear_systems import expand
 from mbsim.reader.overrides import apply_overrides, as_texts
 from mbsim.reader.parse import MAX_BYTES, Node, parse
 from mbsim.reader.points import hold_points
@@ -92,6 +93,7 @@ def _read(path: Given, texts: tuple[str, ...]) -> el.Model:
     name, data = _given(path)
     deck = Path(name)
     draft, said_so = _read_draft(name, data, texts)
+    draft.faults.extend(map(said_so, expand(draft)))
     complete_motions(draft)
     model = _to_model(draft, deck, hashlib.sha256(data + draft.more).hexdigest())
     known = Known(frozenset(draft.broken), draft.display_graphics)

@@ -169,7 +169,7 @@ def test_a_spline_by_text_by_attributes_and_by_file(tmp_path):
         ('<Reference_Spline id="1">0 one</Reference_Spline>', 'points="0 one": must be numbers'),
         ('<Reference_Spline id="1" file="none.csv"/>', "No such file"),
         ('<Reference_Array id="1"/>', "values: missing"),
-        ('<Reference_Array id="1" type="X">1</Reference_Array>', "X is not built yet; built: IC"),
+        ('<Reference_Array id="1" type="X">1</Reference_Array>', "an array of type X has none"),
         ('<Reference_Array id="1" values="1">1</Reference_Array>', "given as text"),
         (
             '<Reference_Spline id="1" x="0 1 2" y="1 2 3"/>'
@@ -232,7 +232,7 @@ def test_splines_and_arrays_of_adams_decks(tmp_path):
         ("SIZE=2", "SIZE=3", "there are 2 NUMBERS"),
         ("Y=1, 0, 0, 0, 1", "Y=1, 0, 0, 0", "has 3 values in a curve, and there are 4 x"),
         ("X=0, 1, 2, 3\n, Y=1", "X=0, 2, 1, 3\n, Y=1", "must ascend"),
-        ("ARRAY/3, IC", "ARRAY/3, X", "X is not built yet"),
+        ("ARRAY/3, IC", "ARRAY/3, X", "an array of type X has none"),
     ],
 )
 def test_faults_of_adams_tables(tmp_path, old, new, said):

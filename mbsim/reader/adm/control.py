@@ -10,7 +10,7 @@ from mbsim.reader.command import PARAM_STATIC
 from mbsim.reader.controls import add_sensor
 from mbsim.reader.kinds import ID
 from mbsim.reader.statement import Entry
-from mbsim.reader.tables import add_spline
+from mbsim.reader.tables import add_array, add_spline
 
 METHODS = ("GSTIFF", "WSTIFF", "HASTIFF", "HHT", "NEWMARK", "CONSTANT_BDF", "ABAM", "RKF45")
 FORMULATIONS = ("I3", "SI2", "SI1", "SI0")
@@ -46,14 +46,13 @@ def build_spline(entry: Entry) -> None:
 
 
 def build_array(entry: Entry) -> None:
-    """Add an array of numbers."""
-    values, size = entry.get("NUMBERS"), entry.get("SIZE")
-    if values is None:
-        return
-    if size is not None and size != len(values):
-        entry.fault(f"there are {len(values)} NUMBERS", "SIZE")
-    array = el.ArrayOfNumbers(entry.get("id", 0), values, source=entry.source)
-    entry.register(entry.draft.arrays, array)
+    """Add an array."""
+    type = entry.get("KIND") or ("IC" if entry.given("NUMBERS") else "U")
+    for name in ("KIND", "NUMBERS", "VARIABLES", "SIZE"):
+        if entry.given(name) and entry.get(name) is None:
+            return
+    numbers, ids = entry.get("NUMBERS", ()), entry.get("VARIABLES", ())
+    add_array(entry, type, entry.get("SIZE"), numbers, ids, ("SIZE", "NUMBERS", "VARIABLES"))
 
 
 def build_sensor(entry: Entry) -> None:

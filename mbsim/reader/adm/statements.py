@@ -52,6 +52,7 @@ from mbsim.reader.adm.forces import (
     build_vector,
 )
 from mbsim.reader.adm.friction import FRICTION
+from mbsim.reader.adm.linear_systems import LSE, MATRIX, TFSISO, VARIABLES
 from mbsim.reader.adm.marker_forces import marker_forces
 from mbsim.reader.keywords import fold
 from mbsim.reader.kinds import (
@@ -331,15 +332,18 @@ STATEMENTS = (
         "ARRAY",
         {
             **_ID,
-            "KIND": Spec(keyword({"ic": "IC"}, {"x": "X", "y": "Y", "u": "U"})),
+            "KIND": Spec(keyword({"ic": "IC", "x": "X", "y": "Y", "u": "U"})),
             "SIZE": Spec(COUNT),
-            "NUMBERS": Spec(NUMBERS, required=True),
-            "VARIABLES": Spec(refused=_NOT_BUILT),
+            "NUMBERS": Spec(NUMBERS),
+            "VARIABLES": Spec(VARIABLES),
         },
         build_array,
         words=_words("KIND", "IC", "X", "Y", "U"),
         xml="Reference_Array",
     ),
+    MATRIX,
+    LSE,
+    TFSISO,
     AdmStatement(
         "SENSOR",
         {
