@@ -24,6 +24,8 @@ _NAMED_BY = {
     "body": BODIES,
     "graphics": ("Post_Graphic",),
     "joint": ("Constraint_Joint",),
+    "array": ("Reference_Array",),
+    "matrix": ("Reference_Matrix",),
 }
 _AXES = "xyz"
 _SQUARES = ("xx", "yy", "zz", "xy", "yz", "xz")
