@@ -59,7 +59,7 @@ from mbsim.dynamics.stiction.rigid_friction import holding_force, side_of_rigid
 from mbsim.geometry.catalog import AT_POINT
 from mbsim.laws.catalog import BRANCHES, STICK, UNDECIDED
 from mbsim.laws.catalog import SLIP as SLIPS
-from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_SPEED, MU_STATIC
+from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_SPEED, KEPT_W, KEPT_Z, MU_STATIC
 
 #: Each change of side adds 1 to chattering, each step takes a tenth of it.
 COOLING = 0.9
@@ -74,6 +74,8 @@ AHEAD, BEFORE_LEAVE = 1e-6, 1e-3
 RESOLVED, ALIKE = 1e-12, 0.1
 #: A load that changes by less of itself within a step passes no limit unseen.
 EVEN = 1e-3
+#: A spring is pulled straight where the sine of the angle to its slip is less.
+STRAIGHT = 0.01
 
 
 @jitable
@@ -321,17 +323,52 @@ def may_turn(scene: Scene, s: int, h: float) -> bool:
 
 
 @jitable
+def slows(scene: Scene, s: int) -> bool:
+    """Return whether the spring in slot s, which slips at both ends of the step, may have stuck.
+
+    It sticks where w.e falls below the rate r by which its limit grows by itself. So it may have
+    where w, e and r change by more within the step than is left of w.e - r at either end. A spring
+    that is pulled straight is left out: what goes back and on again there is seen by its speed.
+    """
+    row, state = scene.work.slot[s], scene.state
+    then, now = state.memory[s], scene.work.memory[s]
+    before = math.hypot(then[KEPT_Z], then[KEPT_Z + 1])
+    after = math.hypot(now[KEPT_Z], now[KEPT_Z + 1])
+    if before == 0.0 or after == 0.0 or row[DEPTH] <= 0.0:
+        return False
+    ax, ay = then[KEPT_Z] / before, then[KEPT_Z + 1] / before
+    bx, by = now[KEPT_Z] / after, now[KEPT_Z + 1] / after
+    ux, uy, vx, vy = then[KEPT_W], then[KEPT_W + 1], now[KEPT_W], now[KEPT_W + 1]
+    # N'/N where it grows; where it falls and the spring's stiffness too it falls no less than so
+    steep = row[STIFFNESS] * row[DEPTH] / row[NORMAL]
+    grew, grows = state.rate[s] / max(state.depth[s], 1e-300), row[RATE] / row[DEPTH]
+    grew *= steep if grew > 0.0 else 1.0
+    grows *= steep if grows > 0.0 else 1.0
+    across = max(
+        abs(ux * ay - uy * ax) / max(math.hypot(ux, uy), 1e-300),
+        abs(vx * by - vy * bx) / max(math.hypot(vx, vy), 1e-300),
+    )
+    if across < STRAIGHT:
+        return False
+    left = min(ux * ax + uy * ay - grew, vx * bx + vy * by - grows)
+    turned = max(math.hypot(ux, uy), math.hypot(vx, vy)) * math.hypot(bx - ax, by - ay)
+    return left < math.hypot(vx - ux, vy - uy) + turned + abs(grows - grew)
+
+
+@jitable
 def hides(scene: Scene, t: float, y: F1, before: F1) -> bool:
     """Return whether a spring that sticks may have slipped since y `before` and stick again.
 
     So it is where load and normal force change by more within the step than is left to the limit.
-    Or whether what slips without give may have stuck within the step, and slip again.
+    Or whether what slips may have stuck within the step, and slip again.
     """
     state, hit, h = scene.state, scene.work.hit, t - scene.state.since[0]
     for k in range(hit[len(hit) - 1]):
         s = hit[k]
         row, z, c = scene.work.slot[s], scene.slots.z[s], contact_of(scene, s)
         if state.touching[s] == 1 and scene.contacts.rigid[c] == 1 and may_turn(scene, s, h):
+            return True
+        if follows(scene, s) and scene.work.touching[s] == 1 and slows(scene, s):
             return True
         if state.touching[s] == 0 or state.mode[s] % BRANCHES != STICK:
             continue

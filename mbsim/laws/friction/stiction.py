@@ -73,9 +73,9 @@ NEAR = 1e-6
 #: of times as long as the touch. The spring is at its limit then at most.
 EARLY = 1e-3
 
-# what is kept: z, or M; z where it slips, M and its rate then; time then; twist less turn since
-# touch, and the sign of its slip; mode
-_Z, _M, _W, _TIME, _TWIST, _TURNS, _MODE = 2, 4, 6, 8, 9, 10, 11
+#: What is kept: z, or M; z where it slips, M and its rate w then; time then; twist less turn since
+#: touch, and the sign of its slip; mode.
+KEPT_Z, _M, KEPT_W, _TIME, _TWIST, _TURNS, _MODE = 2, 4, 6, 8, 9, 10, 11
 
 
 @jitable
@@ -237,7 +237,18 @@ def stiction(  # noqa: C901
     if k <= 0.0 or inputs.nforce <= 0.0:
         nothing = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, SLIP, SLIP, 1.0, 0.0)
         kept = (px, py) if before == SLIP else (0.0, 0.0)
-        still = (*kept, memory[_Z], memory[_Z + 1], *kept, 0.0, 0.0, time, -inputs.x[2], 0.0, SLIP)
+        still = (
+            *kept,
+            memory[KEPT_Z],
+            memory[KEPT_Z + 1],
+            *kept,
+            0.0,
+            0.0,
+            time,
+            -inputs.x[2],
+            0.0,
+            SLIP,
+        )
         return nothing, (*still, 0.0, 0.0)
     c, heavy = tangential_damping, math.sqrt(k * inputs.mass)
     if math.isnan(c):
@@ -257,9 +268,9 @@ def stiction(  # noqa: C901
         # the spring's direction, behind the slip since the committed state
         since = time - memory[_TIME]
         mx, my = px - memory[_M], py - memory[_M + 1]
-        long = math.hypot(memory[_Z], memory[_Z + 1])
-        ex, ey = (memory[_Z] / long, memory[_Z + 1] / long) if long > 0.0 else (0.0, 0.0)
-        ax, ay = since * memory[_W], since * memory[_W + 1]
+        long = math.hypot(memory[KEPT_Z], memory[KEPT_Z + 1])
+        ex, ey = (memory[KEPT_Z] / long, memory[KEPT_Z + 1] / long) if long > 0.0 else (0.0, 0.0)
+        ax, ay = since * memory[KEPT_W], since * memory[KEPT_W + 1]
         ex, ey = dragged(ex, ey, ax, ay, mx, my, since * wx, since * wy)
         along = v[0] * ex + v[1] * ey
         mode = SLIP
