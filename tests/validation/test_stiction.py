@@ -457,7 +457,9 @@ def test_a_spring_that_holds_for_a_part_of_a_step_is_seen(tmp_path, method, tol)
     rim = results["events"][results["events"]["element"] == 1]
     seen = [(float(e["time"]), str(e["kind"])) for e in rim if e["time"] > 0.27]
     assert [kind for _, kind in seen] == ["stick", "slip"]
-    assert [time for time, _ in seen] == pytest.approx([0.282288, 0.284191], abs=1e-5)
+    assert [time for time, _ in seen] == pytest.approx(
+        [0.282288, 0.284191], abs=max(1e-5, 30.0 * tol)
+    )
 
 
 @pytest.mark.parametrize("law", ["LUGRE", "DAHL", "STICTION"])
