@@ -74,8 +74,6 @@ AHEAD, BEFORE_LEAVE = 1e-6, 1e-3
 RESOLVED, ALIKE = 1e-12, 0.1
 #: A load that changes by less of itself within a step passes no limit unseen.
 EVEN = 1e-3
-#: A spring is pulled straight where the sine of the angle to its slip is less.
-STRAIGHT = 0.01
 
 
 @jitable
@@ -291,20 +289,26 @@ def counts_as(scene: Scene, s: int) -> float:
 
 
 @jitable
-def bends(scene: Scene, y: F1, before: F1) -> bool:
-    """Return whether the way of some slip since y `before` is another than friction's direction.
+def bends_in(scene: Scene, s: int, y: F1, before: F1) -> bool:
+    """Return whether the way of slip in slot s since y `before` is not friction's direction.
 
     By an angle that tol sees: less changes its direction by less.
     """
-    hit, tol = scene.work.hit, scene.audit.plan[AUDIT_TOL]
+    if not follows(scene, s):
+        return False
+    row, z = scene.work.slot[s], scene.slots.z[s]
+    mx, my = y[z] - before[z], y[z + 1] - before[z + 1]
+    size = math.hypot(row[ALONG_X], row[ALONG_Y]) * math.hypot(mx, my)
+    across = abs(row[ALONG_X] * my - row[ALONG_Y] * mx)
+    return counts_as(scene, s) * across > scene.audit.plan[AUDIT_TOL] * size
+
+
+@jitable
+def bends(scene: Scene, y: F1, before: F1) -> bool:
+    """Return whether the way of some slip since y `before` bends."""
+    hit = scene.work.hit
     for k in range(hit[len(hit) - 1]):
-        s = hit[k]
-        if not follows(scene, s):
-            continue
-        row, z = scene.work.slot[s], scene.slots.z[s]
-        mx, my = y[z] - before[z], y[z + 1] - before[z + 1]
-        size = math.hypot(row[ALONG_X], row[ALONG_Y]) * math.hypot(mx, my)
-        if counts_as(scene, s) * abs(row[ALONG_X] * my - row[ALONG_Y] * mx) > tol * size:
+        if bends_in(scene, hit[k], y, before):
             return True
     return False
 
@@ -327,8 +331,8 @@ def slows(scene: Scene, s: int) -> bool:
     """Return whether the spring in slot s, which slips at both ends of the step, may have stuck.
 
     It sticks where w.e falls below the rate r by which its limit grows by itself. So it may have
-    where w, e and r change by more within the step than is left of w.e - r at either end. A spring
-    that is pulled straight is left out: what goes back and on again there is seen by its speed.
+    where w, e and r change by more within the step than is left of w.e - r at either end. One
+    whose way is straight is not asked: what goes back and on again there is seen by its speed.
     """
     row, state = scene.work.slot[s], scene.state
     then, now = state.memory[s], scene.work.memory[s]
@@ -344,12 +348,6 @@ def slows(scene: Scene, s: int) -> bool:
     grew, grows = state.rate[s] / max(state.depth[s], 1e-300), row[RATE] / row[DEPTH]
     grew *= steep if grew > 0.0 else 1.0
     grows *= steep if grows > 0.0 else 1.0
-    across = max(
-        abs(ux * ay - uy * ax) / max(math.hypot(ux, uy), 1e-300),
-        abs(vx * by - vy * bx) / max(math.hypot(vx, vy), 1e-300),
-    )
-    if across < STRAIGHT:
-        return False
     left = min(ux * ax + uy * ay - grew, vx * bx + vy * by - grows)
     turned = max(math.hypot(ux, uy), math.hypot(vx, vy)) * math.hypot(bx - ax, by - ay)
     return left < math.hypot(vx - ux, vy - uy) + turned + abs(grows - grew)
@@ -368,7 +366,7 @@ def hides(scene: Scene, t: float, y: F1, before: F1) -> bool:
         row, z, c = scene.work.slot[s], scene.slots.z[s], contact_of(scene, s)
         if state.touching[s] == 1 and scene.contacts.rigid[c] == 1 and may_turn(scene, s, h):
             return True
-        if follows(scene, s) and scene.work.touching[s] == 1 and slows(scene, s):
+        if scene.work.touching[s] == 1 and bends_in(scene, s, y, before) and slows(scene, s):
             return True
         if state.touching[s] == 0 or state.mode[s] % BRANCHES != STICK:
             continue
