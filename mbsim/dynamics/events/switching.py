@@ -74,6 +74,9 @@ AHEAD, BEFORE_LEAVE = 1e-6, 1e-3
 RESOLVED, ALIKE = 1e-12, 0.1
 #: A load that changes by less of itself within a step passes no limit unseen.
 EVEN = 1e-3
+#: Over a shorter part of its length a spring that slips does not stick and slip unseen: it hardly
+#: turns, and where slip is rounding its way has no direction.
+SHORT_WAY = 0.01
 
 
 @jitable
@@ -327,8 +330,10 @@ def may_turn(scene: Scene, s: int, h: float) -> bool:
 
 
 @jitable
-def slows(scene: Scene, s: int) -> bool:
+def slows(scene: Scene, s: int, way: float) -> bool:
     """Return whether the spring in slot s, which slips at both ends of the step, may have stuck.
+
+    `way` is how far it slipped within the step, in lengths of the spring.
 
     It sticks where w.e falls below the rate r by which its limit grows by itself. So it may have
     where w, e and r change by more within the step than is left of w.e - r at either end. One
@@ -338,7 +343,7 @@ def slows(scene: Scene, s: int) -> bool:
     then, now = state.memory[s], scene.work.memory[s]
     before = math.hypot(then[KEPT_Z], then[KEPT_Z + 1])
     after = math.hypot(now[KEPT_Z], now[KEPT_Z + 1])
-    if before == 0.0 or after == 0.0 or row[DEPTH] <= 0.0:
+    if before == 0.0 or after == 0.0 or row[DEPTH] <= 0.0 or way < SHORT_WAY:
         return False
     ax, ay = then[KEPT_Z] / before, then[KEPT_Z + 1] / before
     bx, by = now[KEPT_Z] / after, now[KEPT_Z + 1] / after
@@ -366,8 +371,10 @@ def hides(scene: Scene, t: float, y: F1, before: F1) -> bool:
         row, z, c = scene.work.slot[s], scene.slots.z[s], contact_of(scene, s)
         if state.touching[s] == 1 and scene.contacts.rigid[c] == 1 and may_turn(scene, s, h):
             return True
-        if scene.work.touching[s] == 1 and bends_in(scene, s, y, before) and slows(scene, s):
-            return True
+        if scene.work.touching[s] == 1 and bends_in(scene, s, y, before):
+            way = math.hypot(y[z] - before[z], y[z + 1] - before[z + 1])
+            if slows(scene, s, way):
+                return True
         if state.touching[s] == 0 or state.mode[s] % BRANCHES != STICK:
             continue
         most = scene.audit.cone[c] * row[NORMAL]
