@@ -163,9 +163,8 @@ APPLIED_FORCE, APPLIED_TORQUE, STORED_ENERGY, LOST_POWER = 0, 3, 6, 7
     PENETRATION,  # depth of rigid contacts
     UNSOLVED_IMPULSES,  # what a step's contact problem is left unsolved by, as a velocity
     STEP_END,  # how far impacts in a step of given length leave its end from that of two halves
-    STEP_ROWS,  # how far rows within such a step are from the state between both halves
-) = range(15)
-AUDITS = 15
+) = range(14)
+AUDITS = 14
 #: How many times what is explained friction may give, beyond which time and element are kept.
 DRIVES_LIMIT = 30.0
 # its columns, of the sample in which the value was largest over what was allowed

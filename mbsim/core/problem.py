@@ -42,7 +42,9 @@ to the committed one before the run ends, but for codes from AT_ONCE on.
 | happens | y, -                   | 1 if an event that is to be located has happened between   |
 |         |                        | the committed point and this one, else 0                   |
 | step    | y, y after (out)       | code; the state a step h after y, of a problem that owns   |
-|         |                        | its contacts; h < 0: -h after a y that is no committed one |
+|         |                        | its contacts, less than 0 where velocities jump in it;     |
+|         |                        | h < 0: -h after a y that is no committed one; h = 0: where |
+|         |                        | that step from y was at its part t < 1                     |
 | reject  | -, -   (h: reason)     | code; told of every rejected step                          |
 | commit  | y (in and out), f      | what follows from the step that is taken: a sum of `Taken` |
 | look    | y at an inner point, - | code; called where `inner` before asked for it             |

@@ -12,6 +12,7 @@ from mbsim.integrators.events import AT_END
 from mbsim.integrators.events import FIRST as FIRST_EVENT
 from mbsim.integrators.scheme import (
     CUT_FROM,
+    HITS,
     LAST_ERROR,
     NEXT_OUTPUT,
     OWN_TIME,
@@ -37,12 +38,23 @@ NEAR_FLOORS = 100.0
 MOST_CUTS = 3
 #: So often at most a step is shortened for the load of what holds.
 MOST_SHORT = 20
+#: A row so near to an end of a step, over its length, is at that end.
+AT_AN_END = 1e-9
 
 
 @jitable
 def output_within(m: Method, times: F1, t: float) -> bool:
     """Return whether an output is due up to time t."""
     return m.counts[NEXT_OUTPUT] < len(times) and times[m.counts[NEXT_OUTPUT]] <= t
+
+
+@jitable
+def row_within(m: Method, times: F1, t: float, h: float) -> float:
+    """Return how far from t the first row within a step h is whose velocities jump, else 0."""
+    if m.memory[HITS] == 0.0 or m.counts[NEXT_OUTPUT] == len(times):
+        return 0.0
+    away = times[m.counts[NEXT_OUTPUT]] - t
+    return away if AT_AN_END * h < away < (1.0 - AT_AN_END) * h else 0.0
 
 
 @jitable
@@ -90,7 +102,8 @@ def attempt_to_event(
 
     And the error of the step before it was made shorter.
 
-    A step with a switch ends just behind it, so that none has one in its midst.
+    A step with a switch ends just behind it, so that none has one in its midst. One in which
+    velocities jump ends at the first row within it.
     A step with an event ends at most LOCATED behind it. It is a whole step of the method, so
     the state there is no interpolated one; where that ends before the event after all, it is
     tried a little longer.
@@ -119,6 +132,10 @@ def attempt_to_event(
             if m.memory[REACH] * h > floor:
                 h *= m.memory[REACH]
                 continue
+        row = row_within(m, times, t, h)
+        if row > 0.0 and not failed:
+            h = row
+            continue
         m.memory[SWITCH_CUT] = 1.0 if cuts > 0 else 0.0
         if steps.events == 0 or failed:
             return failure_or(m, code), part, asked, h, uncut

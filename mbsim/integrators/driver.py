@@ -206,9 +206,10 @@ def reject(p: Problem, m: Method, t: float, h: float, reason: int, cut_from: flo
 def gives_up(m: Method, code: int, t: float, h: float, floor: float) -> bool:
     """Return whether the failure of a hook in the step from t ends the run.
 
-    Else it is tried again nearer: a trial far ahead may be where no law was meant for.
+    Else it is tried again nearer: a trial far ahead may be where no law was meant for. What a
+    shorter step is known to mend is not counted.
     """
-    if code == Code.NOT_CONVERGED:
+    if code in (Code.NOT_CONVERGED, Code.TOO_FAR):
         return False
     m.memory[FAILURES] += 1.0
     m.memory[FAILED_AT] = t + h

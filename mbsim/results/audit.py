@@ -121,14 +121,6 @@ ENTRIES = (
         10.0,
         "contact",
     ),
-    Judged(
-        codes.STEP_ROWS,
-        "step_rows",
-        "rows within a step of the deck's length that has an impact lie on a line: they are off by "
-        "up to {value:.3g} (choose a print_interval of whole steps)",
-        10.0,
-        "contact",
-    ),
 )
 #: Those of energy.
 ENERGIES = ("energy", "energy_step")

@@ -47,10 +47,9 @@ FIXED, SLOP, LEFT, SOME_AHEAD, PUSH_SPEED, LEFT_SPEED, LEFT_PART = range(7)
 PLAN_NUMBERS = 7
 # entries of `Tally.number`, of the last step tried: what the solver left, as a velocity; its
 # length; the contact that closed fastest in it, and by how much within its length; how far its end
-# is from that of two halves, and its middle from the state between them; when it ended, once it
-# was taken
-RESIDUAL, STEP_LENGTH, FASTEST, CLOSED, END_OFF, ROWS_OFF, ENDED = range(7)
-TALLY_NUMBERS = 7
+# is from that of two halves; 1 where velocities jump in it or in either of two halves
+RESIDUAL, STEP_LENGTH, FASTEST, CLOSED, END_OFF, HIT = range(6)
+TALLY_NUMBERS = 6
 # entries of `Tally.count`: contact points, points that press, sweeps so far, steps tried so far,
 # steps that were left unsolved, steps with positions projected, Newton iterations so far, points
 # so far, steps of the deck's length that were compared with two halves
@@ -89,13 +88,14 @@ class Motion(NamedTuple):
     v: F2  # (nb + 1, 6) with them
     shift: F2  # (nb + 1, 6) displacement over the step's length
     part: F1  # (nb + 1,) of `before` in that, the rest being v's
+    touch: F1  # (nb + 1,) part of the step at which a body first meets something that turns it
+    flies: F1  # (nb + 1,) whether it flies before that and behind, see `displacements`
     reach: F1  # (ng,) how far a graphic may come in the step
     went: F1  # (ng,) how far it goes by what impulses give
     slope: F1  # (ny,) y'
     way: F2  # (2, 6) velocities of the bodies of a pair that is moved ahead
     frames: F2  # (2, 12) of its graphics at the step's begin
     taken: I1  # (pairs + 1,) the try of a step in which a pair has points by that; last: this one
-    least: F1  # (groups,) `part` of each group
     impulse: F1  # (ny,) impulses on bodies, then what they change of velocities
     middle: F1  # (ny,) state in the midst of a step
     half: F2  # (2, ny) states of a step's two halves, where it is compared with them
@@ -127,6 +127,7 @@ class Points(NamedTuple):
     mu: F1  # (m,)
     holds: F1  # (m,) mu as it is at the step's begin
     ahead: F1  # (m,) u_n + ahead >= 0 where the point closes
+    part: F1  # (m,) of the step before an impact with restitution
     closing: F1  # (m,) u_n before the step
     r: F2  # (m, 3)
     old: F2  # (m, 3) r before the sweep at hand
@@ -186,13 +187,14 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int]) -
         v=numbers(nb + 1, 6),
         shift=numbers(nb + 1, 6),
         part=numbers(nb + 1),
+        touch=numbers(nb + 1),
+        flies=numbers(nb + 1),
         reach=numbers(ng),
         went=numbers(ng),
         slope=numbers(ny),
         way=numbers(2, 6),
         frames=numbers(2, 12),
         taken=whole(pairs + 1),
-        least=numbers(len(plan.first)),
         impulse=numbers(ny),
         middle=numbers(ny),
         half=numbers(2, ny),
@@ -220,6 +222,7 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int]) -
         mu=numbers(m),
         holds=numbers(m),
         ahead=numbers(m),
+        part=numbers(m),
         closing=numbers(m),
         r=numbers(m, 3),
         old=numbers(m, 3),

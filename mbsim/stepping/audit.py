@@ -22,7 +22,6 @@ from mbsim.arrays.codes import (
     LARGEST_FRICTION,
     PENETRATION,
     STEP_END,
-    STEP_ROWS,
     STEPS_ALL,
     STEPS_SINCE,
     UNSOLVED_IMPULSES,
@@ -37,12 +36,10 @@ from mbsim.dynamics.bodies.scales import fill_squares
 from mbsim.dynamics.pipeline.audit import note
 from mbsim.stepping.arrays import (
     END_OFF,
-    ENDED,
     FASTEST,
     FIXED,
     POINTS,
     RESIDUAL,
-    ROWS_OFF,
     STEP_LENGTH,
     Stepping,
 )
@@ -52,8 +49,6 @@ from mbsim.stepping.friction import left_of
 CONE_ROUNDING = 1e-12
 #: Depth that steps explain, over the scene's length times tol.
 EXPLAINED = 10.0
-#: Part of a step before its end in which rows are those of its end.
-SHORT = 1e-6
 
 
 @jitable
@@ -84,15 +79,6 @@ def explained(scene: Scene, S: Stepping) -> float:
 
 
 @jitable
-def examine_row(scene: Scene, S: Stepping, t: float) -> None:
-    """Note how far a row within a step of given length may be from the motion."""
-    number = S.tally.number
-    inside = number[ENDED] - t
-    if number[ROWS_OFF] > 0.0 and SHORT * number[STEP_LENGTH] < inside < number[STEP_LENGTH]:
-        note(scene, STEP_ROWS, number[ROWS_OFF], explained(scene, S), t, int(number[FASTEST]))
-
-
-@jitable
 def examine_step(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> None:
     """Note what the step that ends at t leaves open."""
     tally, number = scene.audit.tally, S.tally.number
@@ -103,7 +89,6 @@ def examine_step(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> None:
     note(scene, UNSOLVED_IMPULSES, number[RESIDUAL], allowed, t, -1)
     examine_points(scene, S, t)
     if S.plan.number[FIXED] == 1.0 and len(scene.contacts.id) > 0:
-        number[ENDED] = t
         note(scene, STEP_END, number[END_OFF], explained(scene, S), t, int(number[FASTEST]))
     tally[STEPS_SINCE] += 1.0
     if tally[STEPS_SINCE] < scene.audit.plan[AUDIT_EVERY]:

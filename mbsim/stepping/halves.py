@@ -22,10 +22,8 @@ from mbsim.stepping.arrays import (
     END_OFF,
     FASTEST,
     POINTS,
-    ROWS_OFF,
     Stepping,
 )
-from mbsim.stepping.moreau import bends, turns
 from mbsim.stepping.step import take_step
 
 #: What impacts may leave off without a word, over tol times the length: `results.audit`.
@@ -77,20 +75,6 @@ def distance(scene: Scene, b: int, one: F1, other: F1) -> float:
 
 
 @jitable
-def fill_middle(S: Stepping, h: float, y: F1, new: F1, out: F1) -> None:
-    """Write the middle of the polynomial that `moreau.fit_dense` fits to the step."""
-    for i in range(len(y)):
-        out[i] = 0.5 * (y[i] + new[i])
-    for at in range(0, len(S.motion.inverse) * BODY_SIZE, BODY_SIZE):
-        if bends(y, new, h, at):
-            for c in range(at, at + AT_Q):
-                out[c] -= 0.125 * h * (new[c + AT_V] - y[c + AT_V])
-            first, last = turns(y, at), turns(new, at)
-            for c in range(4):
-                out[at + AT_Q + c] -= 0.125 * h * (last[c] - first[c])
-
-
-@jitable
 def take_part(
     scene: Scene, S: Stepping, t: float, h: float, y: F1, new: F1, committed: bool
 ) -> int:
@@ -110,7 +94,7 @@ def take_fixed_step(scene: Scene, S: Stepping, t: float, h: float, y: F1, new: F
     """
     number, half = S.tally.number, S.motion.half
     code = take_part(scene, S, t, h, y, new, True)
-    number[END_OFF] = number[ROWS_OFF] = 0.0
+    number[END_OFF] = 0.0
     if code != 0 or not is_doubtful(scene, S, h):
         return code
     S.tally.count[COMPARED] += 1
@@ -119,11 +103,8 @@ def take_fixed_step(scene: Scene, S: Stepping, t: float, h: float, y: F1, new: F
         code = take_part(scene, S, t + 0.5 * h, 0.5 * h, half[0], half[1], False)
     if code != 0:
         return code
-    end, rows = 0.0, 0.0
+    end = 0.0
     for b in range(len(scene.bodies.mass)):
         end = max(end, distance(scene, b, new, half[1]))
-    fill_middle(S, h, y, new, half[1])
-    for b in range(len(scene.bodies.mass)):
-        rows = max(rows, distance(scene, b, half[1], half[0]))
-    number[END_OFF], number[ROWS_OFF] = end, rows
+    number[END_OFF] = end
     return take_part(scene, S, t, h, y, new, True)

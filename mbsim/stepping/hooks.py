@@ -9,6 +9,7 @@ from mbsim.arrays.hooks import Contacts, Hook, Joints, failure_or
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, vector_at, view
 from mbsim.core.arrays import F1, Pointer
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import Taken
 from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics
@@ -16,8 +17,9 @@ from mbsim.dynamics.bodies.scales import take_speeds
 from mbsim.dynamics.contact.detection import find_contacts
 from mbsim.dynamics.pipeline.hooks import accept
 from mbsim.dynamics.pipeline.output import no_room, scaled_error
-from mbsim.stepping.arrays import FIXED, Stepping
-from mbsim.stepping.audit import examine_row, examine_step
+from mbsim.stepping.arrays import ALL_STEPS, FIXED, HIT, Stepping
+from mbsim.stepping.audit import examine_step
+from mbsim.stepping.displacements import place_within
 from mbsim.stepping.friction import overdue
 from mbsim.stepping.halves import take_fixed_step
 from mbsim.stepping.pairs import commit_distances
@@ -30,14 +32,17 @@ from mbsim.stepping.rows import (
     push_as_kept,
     watch_peaks,
 )
-from mbsim.stepping.step import take_step
+from mbsim.stepping.step import take_step, want_room
 
 
 @jitable
 def push(scene: Scene, S: Stepping, h: float, y: F1) -> int:
-    """Add what contacts did in the last step; at its end find what overlaps. Return 0 or a code."""
+    """Add what contacts did in the last step; before the first one find what overlaps.
+
+    Return 0 or a code.
+    """
     push_as_kept(scene, S, y)
-    if h > 0.0 or S.kept.count[0] > 0:
+    if h > 0.0 or S.tally.count[ALL_STEPS] > 0:
         return 0
     code = find_contacts(scene, y)
     hit = scene.work.hit
@@ -67,23 +72,31 @@ def serve_contacts(context: int, what: int, t: float, h: float, a: Pointer, b: P
     elif what == Contacts.ENERGY:
         add_lost(scene, y, vector_at(b, scene.rows.energy.shape[1]))
     elif what == Contacts.ROW:
-        examine_row(scene, S, t)
         fill_contacts(scene, S, y, scene.rows.contact[scene.rows.used[0]])
     return 0
 
 
 def step(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
-    """The state a step later; t is the step's begin, less 0 h where it is not the committed one."""
+    """The state a step later; t is the step's begin, h < 0 where it is not the committed one.
+
+    Less than 0 where velocities jump in it. With h = 0 the state at the part t of the last one.
+    """
     scene = view(context, Scene)
     S = view(scene.world.hooks[Hook.STEPPING], Stepping)
     n = scene.rows.y.shape[1]
     length, committed = abs(h), h > 0.0
     y, new = vector_at(a, n), vector_at(b, n)
+    if h == 0.0:
+        place_within(scene, S, y, t, new)
+        return 0
     if S.plan.number[FIXED] == 1.0:
         code = take_fixed_step(scene, S, t, length, y, new)
     else:
         code = take_step(scene, S, t, length, y, new, committed)
-    return failure_or(scene, code)
+    code = failure_or(scene, code)
+    if code == Code.TOO_FAR:
+        want_room(scene)
+    return -1 if code == 0 and S.tally.number[HIT] == 1.0 else code
 
 
 def norm(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:

@@ -1,11 +1,13 @@
 """MOREAU: nonsmooth time stepping, of order 1, whose contacts are the problem's own.
 
 The problem does the step (`stepping.step`); here its error is estimated: a step and two halves of
-it, compared in positions alone, as velocities jump; and what the polynomial of the whole step has
-in its middle, compared with the state between both halves: rows within an impact's step are that
-far off, and what meets a second time in one step is seen. The error of a step is of order 2; across
-an impact it is of order 1, which a shorter step brings down all the same. Where the deck fixes the
-step there is no estimate, and the step is that.
+it, compared in positions alone, as velocities jump; and where the whole step is in its middle,
+compared with the state between both halves: what meets a second time in one step is seen. The error
+of a step is of order 2; across an impact it is of order 1, which a shorter step brings down all the
+same. Where the deck fixes the step there is no estimate, and the step is that.
+
+The polynomial is that of a step in which no velocity jumps. One in which some do ends at the first
+row within it (memory[HITS], `attempt`), so that rows are states of the motion at either side.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.problem import POSITION, VELOCITY, Problem
 from mbsim.integrators.scheme import (
     EVALUATIONS,
+    HITS,
     LAST_ERROR,
     TOL,
     Method,
@@ -24,20 +27,26 @@ from mbsim.integrators.scheme import (
     project,
 )
 
-#: Rows of k: f, the whole step, the state between both halves, and from there on the polynomial.
-WHOLE, MIDDLE, FITTED = 1, 2, 3
+#: Rows of k: f, the whole step, its own middle, the state between both halves, and from there on
+#: the polynomial.
+WHOLE, WITHIN, MIDDLE, FITTED = 1, 2, 3, 4
 #: Numbers of a body's position, and of its velocity behind that: v, then w in the body's axes.
 OF_POSITION, SHIFT, SPIN = 7, 7, 10
 
 
 @jitable
-def one_step(p: Problem, m: Method, t: float, h: float) -> int:
-    """Fill the trial point by one step; return a code."""
+def part_step(p: Problem, m: Method, t: float, h: float, y: F1, out: F1) -> int:
+    """Fill `out` by a step from y, whose begin is not the committed point where h < 0.
+
+    Return a code.
+    """
     m.counts[EVALUATIONS] += 1
-    m.memory[LAST_ERROR] = 0.0
-    code = call_int(p.step, (p.context, t, h, m.y, m.trial))
+    code = call_int(p.step, (p.context, t, h, y, out))
+    if code < 0:
+        m.memory[HITS] = 1.0
+        code = 0
     if code == 0:
-        project(p, m, t + h, h, m.trial)
+        project(p, m, t + abs(h), abs(h), out)
     return code
 
 
@@ -92,25 +101,30 @@ def fit_dense(m: Method, h: float, d: F2) -> None:
 @jitable
 def attempt(p: Problem, m: Method, t: float, h: float) -> int:
     """Fill the trial point by two halves of a step, and its error by a whole one; return a code."""
-    whole, middle, d = m.k[WHOLE], m.k[MIDDLE], m.k[FITTED : FITTED + 3]
-    m.counts[EVALUATIONS] += 3
-    code = call_int(p.step, (p.context, t, h, m.y, whole))
+    whole, within, middle, d = m.k[WHOLE], m.k[WITHIN], m.k[MIDDLE], m.k[FITTED : FITTED + 3]
+    m.memory[HITS] = 0.0
+    code = part_step(p, m, t, h, m.y, whole)
+    met = m.memory[HITS] == 1.0
+    if code == 0 and met:
+        code = call_int(p.step, (p.context, 0.5, 0.0, m.y, within))
+        if code == 0:
+            project(p, m, t + 0.5 * h, 0.5 * h, within)
     if code == 0:
-        project(p, m, t + h, h, whole)
-        code = call_int(p.step, (p.context, t, 0.5 * h, m.y, middle))
+        code = part_step(p, m, t, 0.5 * h, m.y, middle)
     if code == 0:
-        project(p, m, t + 0.5 * h, 0.5 * h, middle)
-        code = call_int(p.step, (p.context, t + 0.5 * h, -0.5 * h, middle, m.trial))
+        code = part_step(p, m, t + 0.5 * h, -0.5 * h, middle, m.trial)
     if code != 0:
         return code
-    project(p, m, t + h, h, m.trial)
-    fit_dense(m, h, d)
+    if not met:
+        # rows are those of the polynomial
+        fit_dense(m, h, d)
+        for i in range(len(m.y)):
+            within[i] = d[0, i] + 0.5 * (d[1, i] + 0.5 * d[2, i])
     for i in range(len(m.y)):
         m.error[i] = 0.0
         if m.kinds[i] == POSITION:
-            end = m.trial[i] - whole[i]
-            within = d[0, i] + 0.5 * (d[1, i] + 0.5 * d[2, i]) - middle[i]
-            m.error[i] = end if abs(end) > abs(within) else within
+            end, half = m.trial[i] - whole[i], within[i] - middle[i]
+            m.error[i] = end if abs(end) > abs(half) else half
     error = call_float(p.norm, (p.context, t, h, m.error, m.trial))
     m.memory[LAST_ERROR] = error / m.memory[TOL]
     return 0
@@ -125,7 +139,8 @@ def _attempt(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
 def _attempt_fixed(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """One step of the length that the deck says."""
     p, m = in_workspace(context)
-    return one_step(p, m, t, h)
+    m.memory[LAST_ERROR] = m.memory[HITS] = 0.0
+    return part_step(p, m, t, h, m.y, m.trial)
 
 
 def _fit_dense(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
@@ -135,6 +150,6 @@ def _fit_dense(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     return 0
 
 
-SCHEME = Scheme(_attempt, _fit_dense, stages=6, last=0, dense=3, order=2.0)
+SCHEME = Scheme(_attempt, _fit_dense, stages=7, last=0, dense=3, order=2.0)
 #: Where the deck fixes the step.
 FIXED_SCHEME = Scheme(_attempt_fixed, _fit_dense, stages=1, last=0, dense=3, order=0.0)

@@ -6,7 +6,7 @@
 
 c is 1/2 for bodies on which no contact closes in the step, so that flight and what slides or rests
 are of order 2; 0 for those that a contact stops, which then end where gap + h u_n' >= 0 says:
-at the surface; with restitution the part of the step before the impact.
+at the surface; with restitution the part of the step before the impact (`displacements`).
 Source: J. J. Moreau (1988); M. Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235; gaps in the
 complementarity: M. Anitescu, F. A. Potra, Nonlinear Dynamics 14 (1997) 231; projection of
 positions: V. Acary, Comput. Methods Appl. Mech. Eng. 256 (2013) 224.
@@ -44,6 +44,7 @@ from mbsim.stepping.arrays import (
     ALL_STEPS,
     ALL_SWEEPS,
     FIXED,
+    HIT,
     KEPT_STICKS,
     LEFT_PART,
     NEWTONS,
@@ -58,6 +59,14 @@ from mbsim.stepping.arrays import (
     STEP_LENGTH,
     UNSOLVED,
     Stepping,
+)
+from mbsim.stepping.displacements import (
+    NO_IMPACT,
+    fill_shift,
+    meets_at,
+    move_bodies,
+    spread_parts,
+    velocities_jump,
 )
 from mbsim.stepping.friction import NOISE, coefficient, keep_loads, left_of, let_yield
 from mbsim.stepping.kept import index_kept, recall
@@ -78,11 +87,11 @@ ROOM = 4.0
 MOST_YIELDS = 6
 #: Overlaps so many times deeper than what does not count are pushed out at a bounded speed.
 DEEP = 5.0
+#: A point that is let go of may close so many times faster than it does.
+LET_GO = 100.0
 #: How often a step's contact problem is solved at most, each time with what bodies hit that the
 #: impulses threw at it.
 MOST_ATTEMPTS = 4
-#: Of `Motion.part`: no impact with restitution.
-NO_IMPACT = 2.0
 
 
 @jitable
@@ -123,6 +132,18 @@ def make_room(scene: Scene, S: Stepping, y: F1, h: float) -> None:
         broadphase.size[0] = max(broadphase.size[0], ROOM * wanted)
         place_graphics(scene, y)
         list_pairs(scene, y)
+
+
+@jitable
+def want_room(scene: Scene) -> None:
+    """Have near pairs listed anew before the next try of a step, as far as shapes went in this."""
+    broadphase, farthest = scene.broadphase, 0.0
+    for g in range(len(scene.graphics.body)):
+        if not math.isinf(broadphase.room[g]):
+            broadphase.room[g] = 0.0
+            if not math.isinf(scene.work.travel[g]):
+                farthest = max(farthest, scene.work.travel[g])
+    broadphase.size[0] = max(broadphase.size[0], ROOM * farthest)
 
 
 @jitable
@@ -204,11 +225,11 @@ def fill_motion(scene: Scene, S: Stepping, y: F1, h: float) -> None:
 
 
 @jitable
-def look_ahead(S: Stepping, k: int, h: float) -> float:
-    """Fill what the normal velocity of point k is held above; return the part before an impact.
+def look_ahead(S: Stepping, k: int, h: float) -> None:
+    """Fill what the normal velocity of point k is held above, and the part before an impact.
 
-    That is NO_IMPACT where there is no restitution: the gap is all that may close. Else the point
-    comes in at u, and leaves at e u; what accelerates it goes on behind the impact.
+    That is NO_IMPACT where it comes too slowly for one: the gap is all that may close. Else the
+    point comes in at u, and leaves at e u; what accelerates it goes on behind the impact.
     """
     P, M, rule = S.points, S.motion, S.rules.number[S.points.contact[k]]
     gap, before = P.gap[k], P.closing[k]
@@ -216,19 +237,49 @@ def look_ahead(S: Stepping, k: int, h: float) -> float:
         # it lies on: to follow what does not count would keep all that rests in motion
         gap = 0.0
     free = velocity_of(P.H, k, 0, M.free, P.body[k, 0], P.body[k, 1])
-    mean = 0.5 * (before + free)
     P.ahead[k] = max(gap, 0.0) / h
+    P.part[k] = NO_IMPACT
+    mean = 0.5 * (before + free)
     if gap + h * mean >= 0.0:
         # it does not close by itself
         P.ahead[k] = max(P.ahead[k], -free)
-        return NO_IMPACT
-    if rule[RESTITUTION] == 0.0 or before >= -max(rule[SLOWEST], NOISE * left_of(S, h)):
-        return NO_IMPACT
-    part = min(max(gap, 0.0) / (h * -mean), 1.0)
-    comes = before + part * (free - before)
+        return
+    part = meets_at(gap, h, before, free)
+    comes, slowest = before + part * (free - before), max(rule[SLOWEST], NOISE * left_of(S, h))
+    if comes >= -slowest or (gap <= S.plan.number[SLOP] and before >= -slowest):
+        return
     leaves = -rule[RESTITUTION] * comes + (1.0 - part) * (free - before)
     P.ahead[k] = -max(leaves, 0.0)
-    return part
+    P.part[k] = part
+
+
+@jitable
+def postpone(S: Stepping, count: int, h: float) -> bool:
+    """Let go of points with restitution at which bodies meet that impulses threw at each other.
+
+    Their impact begins with the next step: at the end of this one they are as near as the
+    projection of positions lets them, with the velocities that bring them together. Solved in one
+    with what threw them, nothing would rebound. Return whether there were any.
+    """
+    P, M, some = S.points, S.motion, False
+    for k in range(count):
+        rule = S.rules.number[P.contact[k]]
+        if P.r[k, 0] == 0.0 or rule[RESTITUTION] == 0.0 or P.part[k] != NO_IMPACT:
+            continue
+        if P.gap[k] <= S.plan.number[SLOP]:
+            continue
+        # without its impulse
+        i, j = P.body[k, 0], P.body[k, 1]
+        u = velocity_of(P.H, k, 0, M.v, i, j)
+        for a in range(3):
+            u -= P.W[k, 0, a] * P.r[k, a]
+        if u >= -max(rule[SLOWEST], NOISE * left_of(S, h)):
+            continue
+        apply(P, k, M.v, (-P.r[k, 0], -P.r[k, 1], -P.r[k, 2]))
+        P.r[k, 0] = P.r[k, 1] = P.r[k, 2] = 0.0
+        P.ahead[k] = -LET_GO * u
+        some = True
+    return some
 
 
 @jitable
@@ -260,77 +311,13 @@ def start_impulses(S: Stepping, h: float, ground: int) -> None:
     """Fill what impulses have to bring about, and velocities with them as they stand."""
     P, M = S.points, S.motion
     for b in range(ground + 1):
-        M.part[b] = NO_IMPACT
         for c in range(6):
             M.v[b, c] = M.free[b, c]
     for k in range(S.tally.count[POINTS]):
-        part = look_ahead(S, k, h)
-        for side in range(2):
-            b = P.body[k, side]
-            M.part[b] = min(M.part[b], part)
+        look_ahead(S, k, h)
         if P.r[k, 0] > 0.0:
             r = (P.r[k, 0], P.r[k, 1], P.r[k, 2])
             apply(P, k, M.v, r)
-
-
-@jitable
-def spread_parts(S: Stepping, count: int, h: float, slop: float, ground: int) -> None:
-    """Find the bodies that a contact stops in the step, all that press on them, and joints hold.
-
-    Between two bodies of different parts a contact that stays closed would open or go deeper.
-    """
-    P, M, plan = S.points, S.motion, S.plan
-    for b in range(ground + 1):
-        if M.part[b] == NO_IMPACT:
-            M.part[b] = 0.5
-    for k in range(count):
-        if P.r[k, 0] == 0.0:
-            continue
-        i, j = P.body[k, 0], P.body[k, 1]
-        after = velocity_of(P.H, k, 0, M.v, i, j)
-        if P.ahead[k] >= 0.0 and 0.5 * h * abs(after - P.closing[k]) > slop:
-            M.part[i] = M.part[j] = 0.0
-    changed = True
-    while changed:
-        changed = False
-        for k in range(count):
-            i, j = P.body[k, 0], P.body[k, 1]
-            if P.r[k, 0] == 0.0 or i == ground or j == ground:
-                continue
-            if M.part[i] != M.part[j]:
-                M.part[i] = M.part[j] = min(M.part[i], M.part[j])
-                changed = True
-        for g in range(len(plan.first) - 1):
-            least, most = math.inf, 0.0
-            for m in range(plan.first[g], plan.first[g + 1]):
-                least = min(least, M.part[plan.members[m]])
-                most = max(most, M.part[plan.members[m]])
-            if most > least:
-                changed = True
-                for m in range(plan.first[g], plan.first[g + 1]):
-                    M.part[plan.members[m]] = least
-
-
-@jitable
-def move_bodies(scene: Scene, S: Stepping, y: F1, h: float, new: F1) -> None:
-    """Write positions and velocities after the step."""
-    M = S.motion
-    for b in range(len(scene.bodies.mass)):
-        at, R = BODY_SIZE * b, scene.work.R[b]
-        for c in range(3):
-            new[at + c] = y[at + c] + h * M.shift[b, c]
-            new[at + AT_V + c] = M.v[b, c]
-        w = unrotate(R, (M.shift[b, 3], M.shift[b, 4], M.shift[b, 5]))
-        turn(y, at, h, w[0], w[1], w[2], new)
-        length = math.sqrt(
-            new[at + 3] ** 2 + new[at + 4] ** 2 + new[at + 5] ** 2 + new[at + 6] ** 2
-        )
-        for c in range(4):
-            new[at + AT_Q + c] /= length
-        matrix_from_quaternion(new[at + AT_Q : at + AT_V], R)
-        w = unrotate(R, (M.v[b, 3], M.v[b, 4], M.v[b, 5]))
-        for c in range(3):
-            new[at + AT_W + c] = w[c]
 
 
 @jitable
@@ -368,20 +355,21 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
         tally.count[NEWTONS] += newtons
         if not math.isfinite(left):
             return Code.NOT_FINITE
-        if not let_yield(S, count, allowed):
+        postponed = postpone(S, count, h)
+        if not let_yield(S, count, allowed) and not postponed:
             break
     if S.plan.number[FIXED] == 0.0:
         keep_loads(S, count, committed)
     spread_parts(S, count, h, slop, nb)
-    for b in range(nb):
-        for c in range(6):
-            M.shift[b, c] = M.part[b] * M.before[b, c] + (1.0 - M.part[b]) * M.v[b, c]
+    fill_shift(S, nb)
     most = max(DEEP * slop, h * S.plan.number[PUSH_SPEED])
     pushes = project_positions(P, M.shift, count, h, slop, most)
     number = tally.number
     # of two halves that make one step the worse one counts
     number[RESIDUAL] = left * allowed if committed else max(left * allowed, number[RESIDUAL])
     number[STEP_LENGTH] = h
+    hit = 1.0 if velocities_jump(S, nb) else 0.0
+    number[HIT] = hit if committed else max(hit, number[HIT])
     tally.count[ALL_SWEEPS] += sweeps
     tally.count[ALL_STEPS] += 1
     tally.count[ALL_POINTS] += count
@@ -464,4 +452,7 @@ def take_step(
     move_bodies(scene, S, y, h, new)
     if S.tally.count[PRESSING] > 0:
         add_losses(scene, S, new)
-    return 0
+        # impulses may throw bodies farther than was looked for
+        if not place_graphics(scene, new):
+            code = Code.TOO_FAR
+    return code

@@ -56,6 +56,27 @@ def ball(folder: Path, height: float, e: float, end_time: float, h: float | None
     return model(folder, parts, end_time, h)
 
 
+def balls(
+    folder: Path,
+    places: list[Any],
+    e: float,
+    mu: float,
+    end_time: float,
+    h: float | None = None,
+    dt: float = 0.01,
+) -> Model:
+    """Return spheres of 1 kg and radius 0.1 at these centres, over the floor."""
+    ids = [100 * (2 + k) for k in range(len(places))]
+    spheres = [text.sphere(2 + k, 1.0, 0.1, place) for k, place in enumerate(places)]
+    parts = [
+        *spheres,
+        text.contact(301, ids, [100], **rubbed(mu, e)),
+        text.contact(302, ids, ids, **rubbed(mu, e)),
+        text.gravity(),
+    ]
+    return model(folder, parts, end_time, h, dt)
+
+
 def slope(folder: Path, mu: float, tangent: float, end_time: float, h: float | None) -> Model:
     """Return a cube at rest on a plane that gravity is tilted against."""
     g, size = 9.81, (1.0 + tangent * tangent) ** 0.5

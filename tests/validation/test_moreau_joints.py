@@ -72,11 +72,15 @@ def test_a_lid_on_a_hinge_falls_on_a_ball_and_rests(tmp_path: Path) -> None:
     assert place[0] > 0.5
 
 
-def test_a_belt_slips_and_sticks() -> None:
-    """A block on a spring and a belt that a motion drives: farthest where the closed form says."""
+@pytest.mark.parametrize("tol", [7e-7, 1e-6, 1.1e-6, 1.5e-6])
+def test_a_belt_slips_and_sticks(tol: float) -> None:
+    """A block on a spring and a belt that a motion drives: farthest where the closed form says.
+
+    Friction yields at 1 - 1e-3 of what it may be (`friction.YIELDS`), and so much is it off.
+    """
     path = MODELS / "belt_stick_slip.xml"
-    results = mbsim.simulate(path, integrator="MOREAU", tol=1e-6, end_time=12.0)
-    assert results["bodies/2/position"][:, 0].max() == pytest.approx(1.0385164807, rel=2e-4)
+    results = mbsim.simulate(path, integrator="MOREAU", tol=tol, end_time=12.0)
+    assert results["bodies/2/position"][:, 0].max() == pytest.approx(1.0385164807, rel=1e-3)
 
 
 def test_a_slider_runs_between_guides() -> None:

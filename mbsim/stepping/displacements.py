@@ -1,0 +1,195 @@
+"""Where bodies go in a step, by their velocities before and behind what they hit in it.
+
+    q' = q moved on for h by c v + (1 - c) v' + 1/2 (c^2 - (1 - c)^2) d,   d = v_free - v
+
+c is the part of the step before an impact with restitution, d what accelerates a body that flies
+before and behind it. c is 1/2 for bodies on which no contact closes in the step, without d, and 0
+for those that a contact stops. Bodies that press on each other have one c, the smallest, and d only
+where nothing but impacts presses on any of them.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1
+from mbsim.core.jitable import jitable
+from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
+from mbsim.core.rotation import matrix_from_quaternion, norm, unrotate, vector
+from mbsim.dynamics.bodies.configuration import turn
+from mbsim.dynamics.bodies.kinematics import place_bodies
+from mbsim.stepping.arrays import LEFT_SPEED, POINTS, STEP_LENGTH, Stepping
+from mbsim.stepping.solver import velocity_of
+
+#: Of `Points.part` and `Motion.part`: no impact with restitution.
+NO_IMPACT = 2.0
+#: Entries of `Motion.flies`: something presses on a body beside impacts; it flies up to an impact
+#: and rests behind it; it flies behind it too.
+PRESSED, LANDS, FLIES = 0.0, 1.0, 2.0
+#: A velocity that changes by more than so many times what forces without contacts change has
+#: jumped.
+JUMPS = 10.0
+
+
+@jitable
+def meets_at(gap: float, h: float, before: float, free: float) -> float:
+    """Return the part of a step h at which a gap is closed first, by velocities at its ends.
+
+    They grow evenly: gap/h + before p + (free - before)/2 p^2 = 0. At most 1.
+    """
+    a, c = 0.5 * (free - before), max(gap, 0.0) / h
+    root = math.sqrt(max(before * before - 4.0 * a * c, 0.0))
+    if before < 0.0:
+        return min(2.0 * c / (root - before), 1.0)
+    return min((before + root) / (-2.0 * a), 1.0) if a < 0.0 else 1.0
+
+
+@jitable
+def start_parts(S: Stepping, count: int, h: float, slop: float, ground: int) -> None:
+    """Fill what each point that presses makes of the way of its two bodies."""
+    P, M = S.points, S.motion
+    for b in range(ground + 1):
+        M.part[b] = M.touch[b] = NO_IMPACT
+        M.flies[b] = FLIES
+    for k in range(count):
+        if P.r[k, 0] == 0.0:
+            continue
+        i, j = P.body[k, 0], P.body[k, 1]
+        part, touch, flies = P.part[k], P.part[k], FLIES if P.ahead[k] < 0.0 else LANDS
+        if part == NO_IMPACT:
+            flies = PRESSED
+            after = velocity_of(P.H, k, 0, M.v, i, j)
+            if 0.5 * h * abs(after - P.closing[k]) > slop:
+                free = velocity_of(P.H, k, 0, M.free, i, j)
+                part, touch = 0.0, meets_at(P.gap[k], h, P.closing[k], free)
+        for b in (i, j):
+            M.part[b], M.touch[b] = min(M.part[b], part), min(M.touch[b], touch)
+            M.flies[b] = min(M.flies[b], flies)
+    for b in range(ground + 1):
+        if M.part[b] == NO_IMPACT:
+            M.part[b] = 0.5
+
+
+@jitable
+def take_least(S: Stepping, i: int, j: int) -> bool:
+    """Let two bodies go their ways as one; return whether that changes something."""
+    M = S.motion
+    if M.part[i] == M.part[j] and M.touch[i] == M.touch[j] and M.flies[i] == M.flies[j]:
+        return False
+    M.part[i] = M.part[j] = min(M.part[i], M.part[j])
+    M.touch[i] = M.touch[j] = min(M.touch[i], M.touch[j])
+    M.flies[i] = M.flies[j] = min(M.flies[i], M.flies[j])
+    return True
+
+
+@jitable
+def spread_parts(S: Stepping, count: int, h: float, slop: float, ground: int) -> None:
+    """Find the bodies that a contact stops in the step, all that press on them, and joints hold.
+
+    Between two bodies of different parts a contact that stays closed would open or go deeper.
+    """
+    P, plan = S.points, S.plan
+    start_parts(S, count, h, slop, ground)
+    changed = True
+    while changed:
+        changed = False
+        for k in range(count):
+            i, j = P.body[k, 0], P.body[k, 1]
+            if P.r[k, 0] != 0.0 and i != ground and j != ground:
+                changed = take_least(S, i, j) or changed
+        for g in range(len(plan.first) - 1):
+            first = plan.members[plan.first[g]]
+            for m in range(plan.first[g] + 1, plan.first[g + 1]):
+                changed = take_least(S, first, plan.members[m]) or changed
+
+
+@jitable
+def fill_shift(S: Stepping, nb: int) -> None:
+    """Fill displacements over the step's length."""
+    M = S.motion
+    for b in range(nb):
+        part = M.part[b]
+        bent = 0.0
+        if M.touch[b] != NO_IMPACT and M.flies[b] != PRESSED:
+            bent = 0.5 * part * part
+            if M.flies[b] == FLIES:
+                bent -= 0.5 * (1.0 - part) * (1.0 - part)
+        for c in range(6):
+            M.shift[b, c] = part * M.before[b, c] + (1.0 - part) * M.v[b, c]
+            if bent != 0.0:
+                M.shift[b, c] += bent * (M.free[b, c] - M.before[b, c])
+
+
+@jitable
+def velocities_jump(S: Stepping, nb: int) -> bool:
+    """Return whether some body met another one in the step: velocities jump within it."""
+    P, M, seen = S.points, S.motion, S.plan.number[LEFT_SPEED]
+    for k in range(S.tally.count[POINTS]):
+        if P.r[k, 0] > 0.0 and -P.closing[k] > seen:
+            return True
+    if S.tally.count[POINTS] == 0:
+        return False
+    for b in range(nb):
+        v, free, before = M.v[b], M.free[b], M.before[b]
+        jump = norm((v[0] - before[0], v[1] - before[1], v[2] - before[2]))
+        usual = norm((free[0] - before[0], free[1] - before[1], free[2] - before[2]))
+        if jump > seen + JUMPS * usual:
+            return True
+    return False
+
+
+@jitable
+def move_bodies(scene: Scene, S: Stepping, y: F1, h: float, new: F1) -> None:
+    """Write positions and velocities after the step."""
+    M = S.motion
+    for b in range(len(scene.bodies.mass)):
+        at, R = BODY_SIZE * b, scene.work.R[b]
+        for c in range(3):
+            new[at + c] = y[at + c] + h * M.shift[b, c]
+            new[at + AT_V + c] = M.v[b, c]
+        w = unrotate(R, (M.shift[b, 3], M.shift[b, 4], M.shift[b, 5]))
+        turn(y, at, h, w[0], w[1], w[2], new)
+        length = math.sqrt(
+            new[at + 3] ** 2 + new[at + 4] ** 2 + new[at + 5] ** 2 + new[at + 6] ** 2
+        )
+        for c in range(4):
+            new[at + AT_Q + c] /= length
+        matrix_from_quaternion(new[at + AT_Q : at + AT_V], R)
+        w = unrotate(R, vector(M.v[b, 3:]))
+        for c in range(3):
+            new[at + AT_W + c] = w[c]
+
+
+@jitable
+def way_within(S: Stepping, b: int, c: int, s: float) -> float:
+    """Return component c of what a body has gone at the part s of the step, over its length."""
+    M = S.motion
+    before, after, touch = M.before[b, c], M.v[b, c], M.touch[b]
+    if touch == NO_IMPACT:
+        return s * (before + 0.5 * s * (after - before))
+    d = M.free[b, c] - before if M.flies[b] != PRESSED else 0.0
+    if s < touch:
+        return s * (before + 0.5 * s * d)
+    left = 1.0 - s
+    if M.flies[b] == FLIES:
+        return M.shift[b, c] - left * (after - 0.5 * left * d)
+    met = touch * (before + 0.5 * touch * d)
+    return M.shift[b, c] - left / (1.0 - touch) * (M.shift[b, c] - met) if left > 0.0 else 0.0
+
+
+@jitable
+def place_within(scene: Scene, S: Stepping, y: F1, s: float, out: F1) -> None:
+    """Write where bodies are at a part s < 1 of the step that was tried last, which began at y.
+
+    Up to where a body meets something it flies; behind that it goes where the step ends. Its
+    displacements are lost by that; velocities are those of the step's end.
+    """
+    M, h = S.motion, S.tally.number[STEP_LENGTH]
+    place_bodies(scene, y)
+    for k in range(len(y)):
+        out[k] = y[k]
+    for b in range(len(scene.bodies.mass)):
+        for c in range(6):
+            M.shift[b, c] = way_within(S, b, c, s)
+    move_bodies(scene, S, y, h, out)
