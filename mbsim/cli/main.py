@@ -27,6 +27,7 @@ COMMANDS = {
     "plot": "mbsim.cli.plot",
     "view": "mbsim.cli.view",
     "report": "mbsim.cli.report",
+    "sweep": "mbsim.cli.sweep",
     "bench": "mbsim.cli.bench",
     "request": "mbsim.cli.request",
     "plot-law": "mbsim.cli.plot_law",

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from mbsim.results.curves import Choice, Picture
     from mbsim.results.reading import Results
 
-_RESULT_SUFFIXES = (".h5", ".hdf5")
+_RESULT_SUFFIXES, _TABLE_SUFFIX = (".h5", ".hdf5"), ".parquet"
 #: Longest made-up name of a picture.
 _LONGEST = 100
 
@@ -65,6 +65,9 @@ def command(
 ) -> None:
     """Draw signals of RESULT.h5 against time, one panel for each quantity.
 
+    STUDY.parquet, the table of `mbsim sweep`, is drawn too: its outputs over its parameters; NAME
+    is then an output or a parameter.
+
     NAME is a signal as `mbsim info RESULT.h5` lists it, for example bodies/2/position/z,
     contacts/301/force/mag, requests/3/F2 or energy/kinetic. Without /x, /y, /z or /mag a vector
     gives all its components; 'bodies/*/velocity/mag' (in quotes) all bodies. Several result
@@ -77,6 +80,12 @@ def command(
     from mbsim.results.opening import read_apart
     from mbsim.results.reading import open_results
 
+    if tables := [name for name in arguments if name.lower().endswith(_TABLE_SUFFIX)]:
+        plain = over == "time" and start is None and end is None and minus is None
+        if not plain or log or events or as_json:
+            raise ModelError(f"{tables[0]}: a table of a study is drawn with -o only")
+        _draw_table(Path(tables[0]), [name for name in arguments if name != tables[0]], output)
+        return
     paths, names = _sorted_out(arguments)
     if events and (over.strip("/") != "time" or len(paths) > 1 or minus is not None):
         raise ModelError("--events goes with one result file over time only")
@@ -103,6 +112,35 @@ def command(
         count = sum(len(panel.curves) for panel in picture.panels)
         quantities = ", ".join(panel.axis for panel in picture.panels)
         echo(f"{target}: {count} curve{'s' * (count > 1)}, {quantities}")
+
+
+def _draw_table(path: Path, names: Sequence[str], output: Path | None) -> None:
+    """Draw the responses of a study: outputs over parameters, all unless some are named."""
+    from mbsim.errors import ModelError
+    from mbsim.results.drawing import check_target, need_matplotlib, save
+    from mbsim.results.response_drawing import MOST_COLUMNS, draw_responses
+    from mbsim.studies.table import Responses
+
+    need_matplotlib()
+    table = Responses(path)
+    if unknown := [name for name in names if name not in (*table.parameters, *table.outputs)]:
+        there = ", ".join((*table.parameters, *table.outputs))
+        raise ModelError(f"{path}: no column {unknown[0]} to draw; there is {there}")
+    parameters = [name for name in table.parameters if name in names] or table.parameters
+    outputs = [name for name in table.outputs if name in names] or table.outputs
+    if not outputs:
+        raise ModelError(f"{path}: has no outputs that are numbers")
+    if len(parameters) > MOST_COLUMNS or len(outputs) > MOST_COLUMNS:
+        raise ModelError(f"{path}: name at most {MOST_COLUMNS} parameters and outputs to draw")
+    target = output or Path(f"{path.stem}.png")
+    check_target(target)
+    columns = {name: table[name] for name in (*parameters, *outputs, "status")}
+    failed = int((columns["status"] == "failed").sum())
+    title = f"{path.stem}: {len(table)} runs" + (f", {failed} failed" if failed else "")
+    from mbsim.cli.messages import warn
+
+    warn(save(draw_responses(columns, parameters, outputs, title), target))
+    echo(f"{target}: {len(outputs)} x {len(parameters)} panels, {len(table)} runs")
 
 
 def _sorted_out(arguments: Sequence[str]) -> tuple[list[Path], tuple[str, ...]]:

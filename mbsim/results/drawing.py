@@ -152,6 +152,32 @@ def draw_signals(results: Results, names: Sequence[str], ax: Axes | None = None)
     return axes
 
 
+def figure_of_points(panels: Sequence[Sequence[Any]], title: str) -> Figure:
+    """Return a figure of points: rows of panels, each x name, y name, x, y, and which are marked.
+
+    Marked points are red crosses.
+    """
+    need_matplotlib()
+    with _style():
+        from matplotlib.figure import Figure
+
+        rows, columns = len(panels), max(map(len, panels))
+        size = (max(_WIDTH, 2.2 * columns), 2.0 * rows + 0.6)
+        figure = Figure(figsize=size, layout="constrained")
+        grid = figure.subplots(rows, columns, sharex="col", sharey="row", squeeze=False)
+        for axes, row in zip(grid, panels, strict=True):
+            for k, (name, output, x, y, marked) in enumerate(row):
+                axes[k].plot(x[~marked], y[~marked], ".", color=_COLOURS[0], markersize=3.0)
+                axes[k].plot(x[marked], y[marked], "x", color=_RED, markersize=4.0)
+                axes[k].margins(x=0.05)
+                if k == 0:
+                    axes[k].set_ylabel(_plain(output))
+                if row is panels[-1]:
+                    axes[k].set_xlabel(_plain(name))
+        figure.suptitle(_plain(title), fontsize=_FONT + 2, fontweight="bold")
+    return figure
+
+
 def _write_around(
     figure: Figure, heading: Sequence[str], shouted: Sequence[str], foot: Sequence[str]
 ) -> None:

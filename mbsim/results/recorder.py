@@ -78,6 +78,8 @@ class Recorder:
         `Settings` of the run, which those of a resumed one must equal.
     asked : sequence of str
         What to record, see `SignalFilter`; nothing stands for everything.
+    bare : bool
+        Of results in memory: leave out what the run is made of, and what only pictures need.
 
     Raises
     ------
@@ -95,8 +97,9 @@ class Recorder:
         resume: bool = False,
         how: Any = None,
         asked: Sequence[str] = (),
+        bare: bool = False,
     ) -> None:
-        self.system = system
+        self.system, self._bare = system, bare and directory is None
         self._asked = SignalFilter(asked)
         self._identity = Identity(system, how)
         self.directory = directory
@@ -131,7 +134,8 @@ class Recorder:
         check_requests(system.model)
         if asked:
             self._asked.check(names_of(system))
-        self._settings: dict[str, Value] = {**attributes, **self._identity.digests}
+        self._settings: dict[str, Value] = dict(attributes)
+        self._settings.update({} if self._bare else self._identity.digests)
         if directory is not None:
             prepare_directory(directory, system.model.name)
             self._target = directory / f"{system.model.name}.h5"
@@ -150,7 +154,8 @@ class Recorder:
         if resume:
             # what a run that ended outside its loop has recorded since is recorded again
             self._store.shorten(partial(length_of, self._written))
-        new = Before({}, {}, {}) if resume else before_rows(self.system, self._asked)
+        asked, shown = self._asked, not self._bare
+        new = Before({}, {}, {}) if resume else before_rows(self.system, asked, shown)
         new.attributes["/"] = {**self._settings, "status": "running"}
         self._store.update(**new._asdict(), remove=["stats", "audit"])
 
@@ -328,7 +333,7 @@ class Recorder:
 
     @property
     def empty(self) -> bool:
-        """Whether not one row was recorded, by this run or by the one that it resumes."""
+        """Whether not one row was recorded, by this run or the one that it resumes."""
         return not (self._started or self._given or self._gathered.bytes)
 
     def abandon(self) -> None:

@@ -97,8 +97,10 @@ class Before(NamedTuple):
     attributes: dict[str, dict[str, Any]]
 
 
-def before_rows(system: System, asked: SignalFilter) -> Before:
-    """Return what a new file says of its elements, their shapes and markers."""
+def before_rows(system: System, asked: SignalFilter, pictures: bool = True) -> Before:
+    """Return what a new file says of its elements, for `pictures` their shapes and markers too."""
+    if not pictures:
+        return Before(facts_of(system, asked), {}, {**without_rows(system)})
     about = about_graphics(system.model, system.placement)
     return Before(
         facts_of(system, asked),

@@ -40,6 +40,8 @@ class Options:
     least_steps: float = 0.0
     h_most: float = math.inf
     most_evaluations: int | None = None
+    # of a run of a study, in memory: without what only files and pictures need
+    bare: bool = False
 
 
 class TooMuchWork(MbsimError):

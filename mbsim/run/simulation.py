@@ -245,6 +245,11 @@ def simulate(
         return verified(read, options, results, _run)
 
 
+def run_model(model: Model, options: Options) -> Results:
+    """Run a model as options say; see `simulate`, of whose warnings `options.notify` is told."""
+    return _run(model, options)
+
+
 def _settled(model: Model, options: Options) -> Settings:
     """Return the settings of a run."""
     asked = options.end_time, options.print_interval, options.integrator, options.tol
@@ -278,7 +283,8 @@ def _run(model: Model, options: Options) -> Results:
     attributes["signals"] = "\n".join(recorded)
     if options.contact_points:
         system.scene = system.scene._replace(rows=with_points(system.scene.rows))
-    recorder = Recorder(system, attributes, folder, options.resume, settings, options.signals)
+    asked = settings, options.signals, options.bare
+    recorder = Recorder(system, attributes, folder, options.resume, *asked)
     try:
         recorder.check_room(output_rows(settings))
     except ModelError:

@@ -1,0 +1,159 @@
+"""`mbsim sweep`: a study of many runs."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from mbsim.cli.messages import counted, echo, warn
+from mbsim.cli.options import json_option
+
+if TYPE_CHECKING:
+    from mbsim.studies.study import Study
+    from mbsim.studies.sweep import Swept
+
+#: Reasons of failed runs that are printed.
+_MOST_REASONS = 3
+
+
+@click.command("sweep")
+@click.argument("file", type=click.Path(path_type=Path), metavar="STUDY.toml")
+@click.option(
+    "-o",
+    "output",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Folder for the table.  [default: <study name>/]",
+)
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Processes on this machine.  [default: one a processor]",
+)
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Let a Dask cluster run them, e.g. tcp://host:8786; its page shows what goes on.",
+)
+@click.option("--resume", is_flag=True, help="Keep the rows that DIR has of the same runs.")
+@click.option(
+    "--only",
+    multiple=True,
+    type=click.IntRange(min=0),
+    metavar="RUN",
+    help="Run this one only, and write all its results into DIR/run-RUN; may be repeated.",
+)
+@click.option(
+    "--progress",
+    type=click.Choice(["auto", "off"]),
+    default="auto",
+    show_default=True,
+    help="auto: shown where standard error is a terminal.",
+)
+@json_option("what came of it as one JSON object")
+def command(
+    file: Path,
+    output: Path | None,
+    workers: int | None,
+    scheduler: str | None,
+    resume: bool,
+    only: tuple[int, ...],
+    progress: str,
+    as_json: bool,
+) -> None:
+    """Run a deck as often as STUDY.toml says, and write DIR/<study>.parquet, a row a run.
+
+    Every row is written down as it comes: what was interrupted goes on with --resume. A run that
+    fails, or warns, is a row that says so.
+    """
+    from mbsim.studies.study import read_study
+    from mbsim.studies.sweep import sweep
+
+    if scheduler is not None and workers is not None:
+        raise click.UsageError("--workers are of this machine: not with --scheduler")
+    study = read_study(file)
+    warn(study.notes)
+    folder = output or Path(study.name)
+    if only:
+        _run_only(study, only, folder, as_json)
+        return
+    shown = progress == "auto" and sys.stderr.isatty()
+    bar = _Bar() if shown else None
+    try:
+        swept = sweep(
+            study,
+            folder,
+            workers=workers,
+            scheduler=scheduler,
+            resume=resume,
+            progress=bar.update if bar else None,
+        )
+    finally:
+        if bar:
+            bar.stop()
+    _show(swept, as_json)
+
+
+class _Bar:
+    """A line on standard error with how many runs there are."""
+
+    def __init__(self) -> None:
+        from rich.console import Console
+        from rich.progress import Progress as Line
+
+        self._line = Line(console=Console(stderr=True), transient=True, refresh_per_second=4)
+        self._task = self._line.add_task("runs", total=None)
+        self._line.start()
+
+    def update(self, done: int, count: int) -> None:
+        """Show how far it is."""
+        self._line.update(self._task, total=count, completed=done, description=f"{done} runs")
+
+    def stop(self) -> None:
+        """Remove the line."""
+        self._line.stop()
+
+
+def _run_only(study: Study, only: tuple[int, ...], folder: Path, as_json: bool) -> None:
+    """Run some of a study's runs here, with all results."""
+    from mbsim.cli.messages import print_json
+    from mbsim.errors import SolverError
+    from mbsim.studies.sweep import write_run
+
+    rows = [write_run(study, run, folder) for run in only]
+    if as_json:
+        print_json([{**row._asdict(), "folder": str(folder / f"run-{row.run}")} for row in rows])
+    for row in rows if not as_json else ():
+        why = f": {row.reason}" if row.reason else ""
+        echo(f"{folder / f'run-{row.run}'}: {row.status}{why}")
+    if all(row.status == "failed" for row in rows):
+        raise SolverError("no run came to its end")
+
+
+def _show(swept: Swept, as_json: bool) -> None:
+    """Print what came of a sweep."""
+    from mbsim.cli.messages import print_json
+
+    if as_json:
+        print_json(
+            {
+                "table": str(swept.table),
+                "runs": sum(swept.counts.values()),
+                **{name: swept.counts.get(name, 0) for name in ("finished", "warned", "failed")},
+                "kept": swept.kept,
+                "reasons": [{"runs": number, "reason": why} for number, why in swept.reasons],
+            }
+        )
+        return
+    counts = ", ".join(f"{number} {name}" for name, number in sorted(swept.counts.items()))
+    already = f"; {swept.kept} were there" if swept.kept else ""
+    echo(f"{swept.table}: {counted(sum(swept.counts.values()), 'runs')}, {counts}{already}")
+    warn(
+        f"{counted(number, 'runs')} failed: {why}" for number, why in swept.reasons[:_MOST_REASONS]
+    )
+    if more := len(swept.reasons) - _MOST_REASONS:
+        warn([f"{more} more reasons are in the table"] if more > 0 else [])

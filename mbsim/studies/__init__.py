@@ -1,0 +1,1 @@
+"""Many runs of one model: study files, designs, workers, tables of results."""

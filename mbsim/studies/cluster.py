@@ -1,0 +1,93 @@
+"""Workers of a Dask cluster; the one home of `distributed`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import islice
+from typing import TYPE_CHECKING, Any
+
+from mbsim.errors import ModelError
+from mbsim.studies.worker import Row, failed, run_batch
+
+if TYPE_CHECKING:
+    from mbsim.studies.study import Study
+
+#: Runs of one task, and tasks that each thread of the cluster has in hand or waiting: a scheduler
+#: that holds all tasks of a large study at once dies of it.
+AT_ONCE, IN_HAND = 25, 3
+#: How long the scheduler may take to answer [s].
+PATIENCE = 20.0
+
+
+def need_distributed() -> Any:
+    """Return the module, or raise `ModelError` saying how it is installed."""
+    try:
+        import distributed
+    except ImportError:
+        raise ModelError('--scheduler needs: pip install "mbsim-contact[studies]"') from None
+    return distributed
+
+
+def cluster_rows(study: Study, address: str, runs: Sequence[int]) -> Iterator[Row]:
+    """Yield the row of every run as it comes from a Dask cluster.
+
+    Parameters
+    ----------
+    study : Study
+        Its model must be at the same path on every worker.
+    address : str
+        Of the scheduler, ``tcp://host:8786``.
+    runs : sequence of int
+
+    Raises
+    ------
+    ModelError
+        If nobody answers there.
+    """
+    distributed = need_distributed()
+    try:
+        client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise ModelError(f"--scheduler {address}: no scheduler answers: {error}") from None
+    with client:
+        if runs:
+            yield from _tasks(distributed, client, study, [[runs[0]]])
+        left = list(runs[1:])
+        yield from _tasks(
+            distributed,
+            client,
+            study,
+            [left[k : k + AT_ONCE] for k in range(0, len(left), AT_ONCE)],
+        )
+
+
+def _tasks(distributed: Any, client: Any, study: Study, batches: list[list[int]]) -> Iterator[Row]:
+    """Yield rows of batches; the scheduler holds a few tasks at a time, and none that is done."""
+    waiting = iter(batches)
+    threads = sum(client.nthreads().values())
+    hold = max(2, IN_HAND * threads)
+    done = distributed.as_completed(loop=client.loop)
+    runs_of: dict[str, list[int]] = {}
+
+    def submit(batch: list[int]) -> None:
+        future = client.submit(run_batch, study, [study.case(run) for run in batch], pure=False)
+        runs_of[future.key] = batch
+        done.add(future)
+
+    for batch in islice(waiting, hold):
+        submit(batch)
+    for future in done:
+        batch = runs_of.pop(future.key)
+        error = future.exception() if future.status != "finished" else None
+        found = future.result() if error is None else None
+        future.release()
+        if found is not None:
+            yield from (Row(*row) for row in found)
+        elif len(batch) > 1:
+            # which of them killed the worker is found by running each alone
+            for run in batch:
+                submit([run])
+        else:
+            yield failed(batch[0], f"{type(error).__name__}: {error}", lost=True)
+        for more in islice(waiting, max(0, hold - len(runs_of))):
+            submit(more)

@@ -1,0 +1,127 @@
+"""Which values the parameters of a study take in which run; one design a function, by name.
+
+Every design is a function of the study alone: its seed, and nothing of the machine.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbsim.errors import ModelError
+from mbsim.studies.distributions import Numbers, Spread
+
+if TYPE_CHECKING:
+    from mbsim.studies.study import Study
+
+#: Most runs of a study: more is a mistyped number.
+MOST_RUNS = 10_000_000
+
+
+def grid(study: Study) -> Numbers:
+    """Return every combination of the parameters' levels, the last parameter fastest."""
+    levels: list[Numbers] = []
+    for name, spread in study.spreads.items():
+        try:
+            levels.append(spread.levels())
+        except ModelError as error:
+            raise ModelError(f"parameters.{name}: {error}") from None
+    if (size := math.prod(map(len, levels))) > MOST_RUNS:
+        raise ModelError(f"a grid of {size} runs; at most {MOST_RUNS}")
+    return np.stack([axis.ravel() for axis in np.meshgrid(*levels, indexing="ij")], axis=1)
+
+
+def latin_hypercube(study: Study) -> Numbers:
+    """Return a Latin hypercube: every parameter in every of `runs` equal parts once.
+
+    McKay, Beckman & Conover, Technometrics 21 (1979) 239-245.
+    """
+    from scipy.stats import qmc
+
+    return _spread(study, _sampler(qmc.LatinHypercube, study).random(study.runs))
+
+
+def sobol(study: Study) -> Numbers:
+    """Return the first `runs` points of Sobol's sequence, scrambled by the seed.
+
+    Sobol, USSR Comp. Math. 7 (1967) 86-112; Owen, J. Complexity 14 (1998) 466-489.
+    """
+    import warnings
+
+    from scipy.stats import qmc
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # no power of 2: `Study.notes` says so
+        points = _sampler(qmc.Sobol, study).random(study.runs)
+    return _spread(study, points)
+
+
+def _sampler(engine: Any, study: Study) -> Any:
+    """Return one of SciPy's engines, seeded; SciPy before 1.15 calls its generator `seed`."""
+    from inspect import signature
+
+    name = "rng" if "rng" in signature(engine).parameters else "seed"
+    return engine(len(study.spreads), **{name: np.random.default_rng(study.seed)})
+
+
+def random(study: Study) -> Numbers:
+    """Return independent points."""
+    points = np.random.default_rng(study.seed).random((study.runs, len(study.spreads)))
+    return _spread(study, points)
+
+
+def table(study: Study) -> Numbers:
+    """Return the rows of the study's CSV, whose first line names the parameters."""
+    file = study.csv
+    assert file is not None
+    columns, rows = _read_csv(file)
+    if missing := sorted(study.spreads.keys() - set(columns)):
+        raise ModelError(f"{file}: no columns {', '.join(missing)}")
+    if extra := sorted(set(columns) - study.spreads.keys()):
+        raise ModelError(f"{file}: columns of no parameter: {', '.join(extra)}")
+    order = [columns.index(name) for name in study.spreads]
+    return np.array(rows, dtype=np.float64).reshape(-1, len(columns))[:, order]
+
+
+def _read_csv(file: Path) -> tuple[list[str], list[list[float]]]:
+    """Return names and rows of a CSV of numbers."""
+    try:
+        with file.open(newline="", encoding="utf-8-sig") as text:
+            lines = [line for line in csv.reader(text) if any(cell.strip() for cell in line)]
+    except (OSError, UnicodeDecodeError) as error:
+        raise ModelError(f"{file}: cannot be read: {error}") from None
+    if len(lines) < 2:
+        raise ModelError(f"{file}: needs a line of names and lines of numbers")
+    names = [cell.strip() for cell in lines[0]]
+    rows: list[list[float]] = []
+    for number, line in enumerate(lines[1:], 2):
+        try:
+            rows.append([float(cell) for cell in line])
+        except ValueError:
+            raise ModelError(f"{file}: row {number}: must be numbers") from None
+        if len(line) != len(names) or not all(map(math.isfinite, rows[-1])):
+            raise ModelError(f"{file}: row {number}: must be {len(names)} finite numbers")
+    return names, rows
+
+
+def _spread(study: Study, points: Any) -> Numbers:
+    """Return points of the unit cube as values of the parameters."""
+    # 0 and 1 are no values of a distribution without bounds
+    tiny = np.finfo(np.float64).eps
+    inside = np.clip(points, tiny, 1.0 - tiny)
+    spreads: list[Spread] = list(study.spreads.values())
+    return np.stack([each.at(inside[:, k]) for k, each in enumerate(spreads)], axis=1)
+
+
+DESIGNS: dict[str, Callable[[Study], Numbers]] = {
+    "grid": grid,
+    "latin_hypercube": latin_hypercube,
+    "sobol": sobol,
+    "random": random,
+    "csv": table,
+}

@@ -1,0 +1,137 @@
+"""Workers on this machine: processes with a pipe each; one that dies loses no run.
+
+A worker sends every row as it comes, so that it is known which run it died in.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+from collections import deque
+from collections.abc import Iterator, Sequence
+from multiprocessing.connection import Connection, wait
+from typing import TYPE_CHECKING, Any
+
+from mbsim.errors import Interrupted
+from mbsim.studies.worker import Row, failed, run_one
+
+if TYPE_CHECKING:
+    from mbsim.studies.study import Case, Study
+
+#: How often a run is tried whose worker dies in it.
+MOST_TRIES = 3
+#: Most runs that a worker is handed at once, and how often at least it comes back for more.
+MOST_AT_ONCE, COMES_BACK = 50, 8
+
+
+def serve(connection: Connection, study: Study) -> None:
+    """Run what is sent, and send the rows: what a worker's process does."""
+    with contextlib.suppress(AttributeError, OSError):
+        os.setsid()  # Ctrl-C is for the process that started this one, which then closes the pipe
+    with contextlib.suppress(EOFError, OSError, Interrupted):
+        while True:
+            for case in connection.recv():
+                connection.send(run_one(study, case))
+
+
+class _Worker:
+    """A process, its pipe, and the runs that it has not sent a row of, in order."""
+
+    def __init__(self, study: Study) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.connection, other = context.Pipe()
+        self.process = context.Process(target=serve, args=(other, study), daemon=True)
+        self.process.start()
+        other.close()  # so that its end is felt here
+        self.runs: deque[int] = deque()
+
+    def give(self, cases: list[Case]) -> None:
+        """Hand over runs."""
+        self.runs.extend(case.run for case in cases)
+        with contextlib.suppress(OSError):  # it has died: felt when it is read from
+            self.connection.send(cases)
+
+    def end(self) -> None:
+        """Let the process end, at once."""
+        self.connection.close()
+        self.process.terminate()
+        self.process.join(5.0)
+        if self.process.is_alive():
+            self.process.kill()
+            self.process.join()
+
+
+class Workers:
+    """Several processes that share a study's runs.
+
+    Attributes
+    ----------
+    died : int
+        How many workers have, so far.
+    """
+
+    def __init__(self, study: Study, count: int) -> None:
+        self._study, self._count = study, count
+        self._waiting: deque[int] = deque()
+        self._workers: list[_Worker] = []
+        self._tries: dict[int, int] = {}
+        self.died = 0
+
+    def rows(self, runs: Sequence[int]) -> Iterator[Row]:
+        """Yield the row of every run as it comes.
+
+        The first run is alone, so that what the others load is compiled once.
+        """
+        self._waiting.extend(runs)
+        try:
+            self._workers = [_Worker(self._study)] if runs else []
+            most = 1
+            while self._waiting or any(worker.runs for worker in self._workers):
+                self._hand_out(most)
+                busy = {w.connection: w for w in self._workers if w.runs}
+                for connection in wait(list(busy)):
+                    row = self._take(busy[connection])  # type: ignore[index]
+                    if row is None:
+                        continue
+                    yield row
+                    if most == 1:
+                        left = len(self._waiting)
+                        most = max(1, min(MOST_AT_ONCE, left // (COMES_BACK * self._count)))
+                        more = min(self._count - 1, left - 1)
+                        self._workers += [_Worker(self._study) for _ in range(more)]
+        finally:
+            for worker in self._workers:
+                worker.end()
+
+    def _hand_out(self, most: int) -> None:
+        """Give workers without runs some of those that wait."""
+        for worker in self._workers:
+            if not worker.runs and self._waiting:
+                size = min(most, len(self._waiting))
+                runs = [self._waiting.popleft() for _ in range(size)]
+                worker.give([self._study.case(run) for run in runs])
+
+    def _take(self, worker: _Worker) -> Row | None:
+        """Return a row that a worker has sent; where it has died, one if that is the last word."""
+        try:
+            row: Any = worker.connection.recv()
+        except (EOFError, OSError):
+            return self._lost(worker)
+        worker.runs.remove(row.run)
+        return Row(*row)
+
+    def _lost(self, worker: _Worker) -> Row | None:
+        """Start another worker in the place of one that died, and give its runs back."""
+        worker.process.join(5.0)
+        code = worker.process.exitcode
+        worker.end()
+        self.died += 1
+        self._workers[self._workers.index(worker)] = _Worker(self._study)
+        in_hand, *others = worker.runs
+        tries = self._tries[in_hand] = self._tries.get(in_hand, 0) + 1
+        self._waiting.extendleft(reversed(others))
+        if tries >= MOST_TRIES:
+            return failed(in_hand, f"its process died {tries} times, exit code {code}", lost=True)
+        self._waiting.appendleft(in_hand)
+        return None

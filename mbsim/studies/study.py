@@ -1,0 +1,318 @@
+"""`read_study`: a study file, TOML, read and checked; its runs as overrides of a deck."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from mbsim import __version__
+from mbsim.errors import ModelError
+from mbsim.reader.written import written
+from mbsim.studies.designs import DESIGNS
+from mbsim.studies.distributions import Numbers, Spread, read_spread
+from mbsim.studies.formulas import Formula
+from mbsim.studies.outputs import Output, read_output
+
+_TABLES = ("study", "run", "parameters", "set", "outputs")
+_STUDY = ("model", "design", "runs", "seed", "csv", "keep")
+#: Options of a run that a study may give: name -> type, as `simulate` has them.
+_RUN: dict[str, tuple[type, ...]] = {
+    "end_time": (int, float),
+    "print_interval": (int, float),
+    "integrator": (str,),
+    "tol": (int, float),
+    "plugins": (list,),
+    "detector": (str,),
+    "interpret_plugins": (bool,),
+    "allow_overlap": (bool,),
+    "plugin_timeout": (int, float),
+    "scripts": (bool,),
+    "most_evaluations": (int,),
+}
+_NAME = re.compile(r"[A-Za-z_]\w*")
+_BRACES = re.compile(r"\{([^{}]*)\}")
+#: What columns of the table are called that are neither parameters nor outputs.
+TAKEN = ("run", "key", "status", "reason", "steps", "evaluations")
+
+
+class Case(NamedTuple):
+    """One run of a study: its number, and the values of its parameters."""
+
+    run: int
+    values: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Study:
+    """What a study file says.
+
+    Attributes
+    ----------
+    model : Path
+        The deck.
+    spreads : dict
+        Values of each parameter, by name.
+    paths : dict
+        ``Element[id].attribute`` -> text with formulas of parameters in braces.
+    """
+
+    file: Path
+    model: Path
+    design: str
+    runs: int
+    seed: int
+    csv: Path | None
+    keep: tuple[int, ...]
+    options: dict[str, Any]
+    spreads: dict[str, Spread]
+    paths: dict[str, str]
+    outputs: tuple[Output, ...]
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def name(self) -> str:
+        """What its files are called."""
+        return self.file.stem
+
+    @functools.cached_property
+    def points(self) -> Numbers:
+        """Values of the parameters, (runs, parameters)."""
+        return DESIGNS[self.design](self)
+
+    @functools.cached_property
+    def _texts(self) -> dict[str, list[str | Formula]]:
+        """Texts of `paths` in parts: plain text, and formulas."""
+        return {path: _parts(text, self.spreads) for path, text in self.paths.items()}
+
+    def case(self, run: int) -> Case:
+        """Return a run with the values of its parameters."""
+        return Case(run, dict(zip(self.spreads, self.points[run].tolist(), strict=True)))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what goes to workers: without the points, and what is made anew."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
+
+    def overrides(self, values: Mapping[str, float]) -> dict[str, str]:
+        """Return what values of the parameters change in the deck, by ``Element[id].attribute``.
+
+        Raises
+        ------
+        ModelError
+            If a formula has no value.
+        """
+        found: dict[str, str] = {}
+        for path, parts in self._texts.items():
+            try:
+                found[path] = "".join(
+                    part if isinstance(part, str) else written(part(values)) for part in parts
+                )
+            except (ArithmeticError, ValueError) as error:
+                raise ModelError(f"set.{path}: {self.paths[path]}: {error}") from None
+        return found
+
+    def key(self, run: int, model: str) -> str:
+        """Return the key of a run: a digest of all that its row follows from.
+
+        `model` is the digest of the deck and of the files that it names.
+        """
+        values = self.case(run).values
+        try:
+            overrides = self.overrides(values)
+        except ModelError as error:
+            overrides = {"": str(error)}
+        outputs = [asdict(output) for output in self.outputs]
+        facts = [__version__, model, self.options, overrides, values, outputs]
+        text = json.dumps(facts, sort_keys=True, default=str)
+        return hashlib.sha256(text.encode()).hexdigest()[:24]
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """What runs record; a contact's peaks are there where its other signals are."""
+        asked = {output.signal.replace("/peak_", "/") for output in self.outputs if output.signal}
+        return tuple(sorted(asked))
+
+
+def read_study(file: str | Path) -> Study:
+    """Return the study that a TOML file describes.
+
+    Raises
+    ------
+    ModelError
+        All that is wrong with it, a line each.
+    """
+    path = Path(file)
+    data = _load(path)
+    faults: list[str] = []
+    if extra := sorted(data.keys() - set(_TABLES)):
+        faults.append(f"unknown table {', '.join(extra)}; known: {', '.join(_TABLES)}")
+    tables = {name: data.get(name, {}) for name in _TABLES}
+    for name, table in tables.items():
+        if not isinstance(table, dict):
+            raise ModelError(f"{path}: {name}: must be a table")
+    about = _about(tables["study"], path, faults)
+    options = _options(tables["run"], path, faults)
+    spreads, paths = _parameters(tables["parameters"], tables["set"], faults)
+    outputs = _outputs(tables["outputs"], spreads, faults)
+    if faults:
+        raise ModelError("\n".join(f"{path}: {fault}" for fault in faults))
+    study = Study(path, **about, options=options, spreads=spreads, paths=paths, outputs=outputs)
+    try:
+        count = len(study.points)
+    except ModelError as error:
+        raise ModelError(f"{path}: {error}") from None
+    if beyond := [run for run in study.keep if not 0 <= run < count]:
+        raise ModelError(f"{path}: study.keep: no run {beyond[0]}; runs are 0 to {count - 1}")
+    return study
+
+
+def _load(path: Path) -> dict[str, Any]:
+    """Return the tables of a TOML file."""
+    try:
+        import tomllib
+    except ImportError:  # Python 3.10
+        try:
+            import tomli as tomllib  # type: ignore[no-redef,import-not-found,unused-ignore]
+        except ImportError:
+            raise ModelError('study files need: pip install "mbsim-contact[studies]"') from None
+    try:
+        with path.open("rb") as stream:
+            found: dict[str, Any] = tomllib.load(stream)
+            return found
+    except OSError as error:
+        raise ModelError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ModelError(f"{path}: is no TOML: {error}") from None
+
+
+def _about(table: Mapping[str, Any], path: Path, faults: list[str]) -> dict[str, Any]:
+    """Return what [study] says."""
+    if extra := sorted(table.keys() - set(_STUDY)):
+        faults.append(f"study: unknown {', '.join(extra)}; known: {', '.join(_STUDY)}")
+    model, design = table.get("model"), table.get("design", "csv" if "csv" in table else "grid")
+    if not isinstance(model, str):
+        faults.append("study.model: the deck must be named")
+    if design not in DESIGNS:
+        faults.append(f"study.design = {design!r}: must be one of {', '.join(DESIGNS)}")
+    runs, seed, keep = table.get("runs", 0), table.get("seed", 0), table.get("keep", [])
+    for name, value in (("runs", runs), ("seed", seed)):
+        if type(value) is not int or value < 0:
+            faults.append(f"study.{name} = {value!r}: must be a whole number from 0 on")
+    counted = design in ("latin_hypercube", "sobol", "random")
+    if counted and runs == 0:
+        faults.append(f"study.runs: {design} needs their number")
+    if not counted and "runs" in table:
+        faults.append(f"study.runs: {design} says itself how many there are")
+    if (design == "csv") != ("csv" in table):
+        faults.append('study: design = "csv" goes with csv = "FILE"')
+    if not isinstance(keep, list) or not all(type(run) is int for run in keep):
+        faults.append(f"study.keep = {keep!r}: must be a list of numbers of runs")
+        keep = []
+    notes: tuple[str, ...] = ()
+    if design == "sobol" and type(runs) is int and runs & (runs - 1):
+        notes = (f"Sobol's sequence is balanced for a power of 2 only; runs = {runs}",)
+    return {
+        "model": path.parent / str(model),
+        "design": design,
+        "runs": runs,
+        "seed": seed,
+        "csv": path.parent / str(table["csv"]) if "csv" in table else None,
+        "keep": tuple(keep),
+        "notes": notes,
+    }
+
+
+def _options(table: Mapping[str, Any], path: Path, faults: list[str]) -> dict[str, Any]:
+    """Return the options of [run], paths of plugins being those from here."""
+    for name, value in table.items():
+        if name not in _RUN:
+            faults.append(f"run: unknown {name}; known: {', '.join(_RUN)}")
+        elif type(value) not in _RUN[name]:
+            faults.append(f"run.{name} = {value!r}: must be a {_RUN[name][-1].__name__}")
+    found = dict(table)
+    if isinstance(found.get("plugins"), list):
+        found["plugins"] = [str(path.parent / str(file)) for file in found["plugins"]]
+    return found
+
+
+def _parameters(
+    tables: Mapping[str, Any], given: Mapping[str, Any], faults: list[str]
+) -> tuple[dict[str, Spread], dict[str, str]]:
+    """Return the values of all parameters, and what they and [set] change in the deck."""
+    spreads: dict[str, Spread] = {}
+    paths: dict[str, str] = {}
+    if not tables:
+        faults.append("parameters: there are none")
+    for name, table in tables.items():
+        if not _NAME.fullmatch(name) or name in TAKEN:
+            faults.append(f"parameters.{name}: must be another name: letters, digits, _")
+        if not isinstance(table, dict):
+            faults.append(f"parameters.{name}: must be a table")
+            continue
+        try:
+            spreads[name] = read_spread(table)
+        except ModelError as error:
+            faults.append(f"parameters.{name}: {error}")
+        where = table.get("path", [])
+        listed = [where] if isinstance(where, str) else where
+        if not isinstance(listed, list) or not all(isinstance(each, str) for each in listed):
+            faults.append(f"parameters.{name}: path: must be a text, or a list of texts")
+            continue
+        for each in listed:
+            if each in paths:
+                faults.append(f"parameters.{name}: {each}: another parameter sets it too")
+            paths[each] = f"{{{name}}}"
+    for each, text in given.items():
+        if each in paths:
+            faults.append(f"set.{each}: a parameter sets it too")
+        paths[each] = text if isinstance(text, str) else written(text)
+    used: set[str] = set()
+    for each, text in paths.items():
+        try:
+            parts = _parts(text, tables)
+        except ModelError as error:
+            faults.append(f"set.{each}: {error}")
+            continue
+        used |= {name for part in parts if isinstance(part, Formula) for name in part.names}
+    faults += [
+        f"parameters.{name}: changes nothing: it has no path, and no [set] names it"
+        for name in tables
+        if name not in used
+    ]
+    return spreads, paths
+
+
+def _parts(text: str, names: Mapping[str, Any]) -> list[str | Formula]:
+    """Return a text of [set] in parts: plain text, and the formulas in braces."""
+    pieces = _BRACES.split(text)
+    return [Formula(piece, names) if k % 2 else piece for k, piece in enumerate(pieces)]
+
+
+def _outputs(
+    tables: Mapping[str, Any], spreads: Mapping[str, Spread], faults: list[str]
+) -> tuple[Output, ...]:
+    """Return all outputs in order."""
+    found: list[Output] = []
+    if not tables:
+        faults.append("outputs: there are none")
+    for name, table in tables.items():
+        if not _NAME.fullmatch(name) or name in TAKEN or name in spreads:
+            faults.append(f"outputs.{name}: must be another name: letters, digits, _")
+        if not isinstance(table, dict):
+            faults.append(f"outputs.{name}: must be a table")
+            continue
+        try:
+            output = read_output(name, table)
+            if output.formula:
+                above = [other.name for other in found if not other.is_curve]
+                Formula(output.formula, [*spreads, *above])
+        except ModelError as error:
+            faults.append(f"outputs.{name}: {error}")
+            continue
+        found.append(output)
+    return tuple(found)

@@ -1,0 +1,203 @@
+"""`sweep`: all runs of a study, each written down as it comes; then one table of them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mbsim.errors import Interrupted, ModelError, SolverError
+from mbsim.studies.journal import Journal, rows_kept
+from mbsim.studies.local import Workers
+from mbsim.studies.table import SUFFIX, need_pyarrow, write_table
+from mbsim.studies.worker import FAILED, Row, run_one
+
+if TYPE_CHECKING:
+    from mbsim.studies.study import Study
+
+#: Called with how many rows there are, and how many there will be.
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Swept:
+    """What a sweep left.
+
+    Attributes
+    ----------
+    table : Path
+        The Parquet file.
+    counts : dict
+        Runs by their status.
+    kept : int
+        How many rows were there already.
+    reasons : list of (int, str)
+        Why runs failed: how many, and why, the most frequent first.
+    """
+
+    table: Path
+    counts: dict[str, int]
+    kept: int
+    reasons: list[tuple[int, str]]
+
+
+def sweep(
+    study: Study,
+    folder: Path,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> Swept:
+    """Run a study and write its table.
+
+    Parameters
+    ----------
+    study : Study
+    folder : Path
+        For ``<study>.parquet``, ``<study>.rows`` (the journal) and ``run-<number>/``.
+    workers : int, optional
+        Local processes; default: one a processor.
+    scheduler : str, optional
+        Address of a Dask scheduler, instead of local processes.
+    resume : bool
+        Keep rows of the same runs that a journal in the folder has.
+    progress : callable, optional
+
+    Raises
+    ------
+    ModelError
+        If the deck, the study or an address is at fault: before the first run.
+    SolverError
+        If not one run came to its end.
+    ResultsError
+        If something cannot be written.
+    Interrupted
+        If Ctrl-C came; what is written stays.
+    """
+    from mbsim.results.files import prepare_directory
+
+    need_pyarrow()
+    count = len(study.points)
+    model = model_digest(study)
+    prepare_directory(folder, study.name)
+    keys = [study.key(run, model) for run in range(count)]
+    path = folder / f"{study.name}.rows"
+    found = rows_kept(path, {key: run for run, key in enumerate(keys)}) if resume else {}
+    # two runs of equal parameters are one row twice
+    same = {key: run for run, key in reversed(list(enumerate(keys)))}
+    left = sorted(run for run in same.values() if run not in found)
+    kept = len(found)
+    if progress is not None:
+        progress(kept, len(same))
+    try:
+        with Journal(path, resume) as journal:
+            for row in _rows(study, left, workers, scheduler):
+                journal.add(keys[row.run], row)
+                found[row.run] = row
+                if progress is not None:
+                    progress(len(found), len(same))
+    except KeyboardInterrupt:
+        raise Interrupted(
+            f"interrupted: {len(found)} of {len(same)} runs are kept in {path}"
+        ) from None
+    by_key = {keys[run]: row for run, row in found.items()}
+    rows = [by_key[key]._replace(run=run) for run, key in enumerate(keys)]
+    table = folder / f"{study.name}{SUFFIX}"
+    write_table(table, study, keys, rows)
+    for run in study.keep:
+        write_run(study, run, folder)
+    counts = Counter(row.status for row in rows)
+    reasons = Counter(row.reason for row in rows if row.status == FAILED).most_common()
+    if counts[FAILED] == count:
+        raise SolverError(f"{table}: not one of {count} runs came to its end: {reasons[0][0]}")
+    return Swept(table, dict(counts), kept, [(number, why) for why, number in reasons])
+
+
+def _rows(
+    study: Study, runs: Sequence[int], workers: int | None, scheduler: str | None
+) -> Iterator[Row]:
+    """Yield rows as they come, from where they are asked of."""
+    if scheduler is not None:
+        from mbsim.studies.cluster import cluster_rows
+
+        return cluster_rows(study, scheduler, runs)
+    return Workers(study, workers or processors()).rows(runs)
+
+
+def processors() -> int:
+    """Return how many processors this process may use."""
+    with suppress(AttributeError):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def write_run(study: Study, run: int, folder: Path) -> Row:
+    """Run one of a study's runs here, and write all its results into ``run-<number>/``.
+
+    Raises
+    ------
+    ModelError
+        If there is no such run.
+    """
+    if not 0 <= run < len(study.points):
+        raise ModelError(f"{study.file}: no run {run}; runs are 0 to {len(study.points) - 1}")
+    return run_one(study, study.case(run), folder / f"run-{run}")
+
+
+def model_digest(study: Study) -> str:
+    """Return the digest of a study's deck and of all files that it names.
+
+    Raises
+    ------
+    DeckError, ModelError
+        If the deck is at fault, or the first run's changes or an output name what it has not.
+    """
+    from mbsim.compile_model.build import build
+    from mbsim.reader.keywords import fold
+    from mbsim.reader.xml import read_model
+    from mbsim.results.identity import Identity
+    from mbsim.results.signal_filter import SignalFilter
+    from mbsim.results.signals import names_of
+    from mbsim.run.settings import settle
+
+    with_changes = read_model(study.model, _first_changes(study))
+    options = study.options
+    how = (options.get(name) for name in ("end_time", "print_interval", "integrator", "tol"))
+    settle(with_changes, *how)
+    plugins = [Path(file) for file in options.get("plugins", [])]
+    system = build(
+        with_changes,
+        plugins,
+        bool(options.get("interpret_plugins", False)),
+        options.get("detector", "auto"),
+        lambda line: None,
+    )
+    known = [*names_of(system), *(f"requests/{id}" for id in system.model.requests)]
+    try:
+        SignalFilter(study.signals).check(known)
+    except ModelError as error:
+        text = str(error).replace("--signals ", "outputs: ")
+        raise ModelError("\n".join(f"{study.file}: {line}" for line in text.split("\n"))) from None
+    facts: dict[str, Any] = Identity(system).facts
+    # without what differs from run to run, so that a study that grows keeps its rows
+    changed = {fold(path.rpartition(".")[0]) for path in study.paths}
+    others = {name: fact for name, fact in facts["model"].items() if fold(name) not in changed}
+    about = [with_changes.sha256, others, facts["subroutines"]]
+    text = json.dumps(about, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _first_changes(study: Study) -> dict[str, str]:
+    """Return what the first run that has values changes: all runs change the same attributes."""
+    for run in range(len(study.points)):
+        with suppress(ModelError):
+            return study.overrides(study.case(run).values)
+    raise ModelError(f"{study.file}: set: formulas have no value in any run")

@@ -1,0 +1,110 @@
+"""What a worker does: run a study's runs, one after the other, each becoming a row."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from mbsim.errors import Interrupted, MbsimError
+from mbsim.studies.outputs import Absent
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from mbsim.results.reading import Results
+    from mbsim.studies.study import Case, Study
+
+#: A run ended as asked; it did, and warned of something; it did not.
+FINISHED, WARNED, FAILED = "finished", "warned", "failed"
+
+#: Users' code and the compiler have one state a process: runs take turns.
+_ALONE = threading.Lock()
+
+
+class Row(NamedTuple):
+    """What a run left: `outputs` holds a number, a list of a curve, or None, by name."""
+
+    run: int
+    status: str
+    reason: str
+    outputs: dict[str, Any]
+    steps: int
+    evaluations: int
+    lost: bool = False  # whether its worker was, which says nothing of the run
+
+
+def failed(run: int, reason: str, lost: bool = False) -> Row:
+    """Return the row of a run that left nothing but why."""
+    return Row(run, FAILED, reason, {}, 0, 0, lost)
+
+
+def run_one(study: Study, case: Case, folder: Path | None = None) -> Row:
+    """Return the row of a run; what went wrong is its `reason`.
+
+    Parameters
+    ----------
+    study : Study
+    case : Case
+    folder : Path, optional
+        Where all its results are written; else they are dropped.
+
+    Raises
+    ------
+    Interrupted
+        If a signal ended it.
+    """
+    from mbsim.reader.xml import read_model
+    from mbsim.run.options import Options
+    from mbsim.run.simulation import run_model
+
+    said: list[str] = []
+    try:
+        model = read_model(study.model, study.overrides(case.values))
+        kept = () if folder is not None else study.signals
+        options = Options(
+            **study.options, output=folder, signals=kept, notify=said.append, bare=folder is None
+        )
+        results = run_model(model, options)
+    except Interrupted:
+        raise
+    except Exception as error:  # a fault of users' code, or of ours, is for the table too
+        return failed(case.run, f"{type(error).__name__}: {error}")
+    with results:
+        warnings = [line for line in said if _warns(line)]
+        return _row(study, case, results, [*model.warnings, *warnings])
+
+
+def _warns(line: str) -> bool:
+    """Return whether a line for the user is a warning."""
+    return line.startswith("warning: ") or ": warning: " in line
+
+
+def _row(study: Study, case: Case, results: Results, warnings: list[str]) -> Row:
+    """Return what a study keeps of results."""
+    values: dict[str, Any] = {}
+    scalars = dict(case.values)
+    for output in study.outputs:
+        try:
+            value = output.of(results, scalars)
+        except Absent as error:
+            value = None
+            warnings.append(str(error))
+        except MbsimError as error:
+            return failed(case.run, f"{type(error).__name__}: {error}")
+        if value is not None and not np.all(np.isfinite(value)):
+            warnings.append(f"outputs.{output.name}: is not finite")
+        values[output.name] = value
+        if not output.is_curve:
+            scalars[output.name] = float("nan") if value is None else value
+    stats = results.stats
+    status = WARNED if warnings else FINISHED
+    reason = "; ".join(dict.fromkeys(warnings))
+    return Row(case.run, status, reason, values, int(stats["steps"]), int(stats["rhs_evaluations"]))
+
+
+def run_batch(study: Study, cases: list[Case]) -> list[Row]:
+    """Return the rows of several runs: a task of a cluster."""
+    with _ALONE:
+        return [run_one(study, case) for case in cases]

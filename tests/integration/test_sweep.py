@@ -1,0 +1,283 @@
+"""`mbsim sweep`: rows are what single runs give, whoever runs them, and no run is lost."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from helpers.folders import PACKAGES
+from mbsim import open_results, read_model, simulate
+from mbsim.cli.main import main
+from mbsim.errors import ModelError, SolverError
+from mbsim.studies.journal import rows_kept
+from mbsim.studies.local import MOST_TRIES, Workers
+from mbsim.studies.study import read_study
+from mbsim.studies.sweep import model_digest, sweep
+from mbsim.studies.table import Responses, write_table
+
+pytest.importorskip("pyarrow")
+
+MODEL = PACKAGES / "models" / "bowling_ball.xml"
+STUDY = """
+[study]
+model = "{model}"
+design = "latin_hypercube"
+runs = {runs}
+seed = 3
+[run]
+end_time = {end}
+[parameters]
+k = {{ path = "Force_Contact[301].stiffness", low = 5e7, high = 2e8, scale = "log" }}
+mu = {{ low = 0.1, high = 0.3 }}
+[set]
+"Force_Contact[301].cff_param_string" = "USER({{mu}},{{0.9*mu}},0.02,0.02)"
+[outputs]
+x = {{ signal = "bodies/2/position/x" }}
+depth = {{ signal = "contacts/301/peak_penetration" }}
+speed = {{ signal = "bodies/2/velocity/x", reduce = "curve" }}
+early = {{ signal = "bodies/2/velocity/x", at = 0.02 }}
+mean = {{ formula = "x/{end}" }}
+"""
+
+
+def study_file(folder, text=STUDY, runs=12, end=0.05, model=MODEL):
+    path = folder / "ball.toml"
+    path.write_text(text.format(model=model, runs=runs, end=end))
+    return path
+
+
+def bytes_of(study, folder, **how):
+    return sweep(study, folder, **how).table.read_bytes()
+
+
+def test_rows_are_those_of_single_runs(tmp_path):
+    study = read_study(study_file(tmp_path))
+    table = Responses(sweep(study, tmp_path / "out", workers=1).table)
+    assert set(table["status"]) == {"finished"}
+    for run in (0, 5, 11):
+        mu, k = table["mu"][run], table["k"][run]
+        changes = {
+            "Force_Contact[301].stiffness": k,
+            "Force_Contact[301].cff_param_string": f"USER({mu},{0.9 * mu},0.02,0.02)",
+        }
+        results = simulate(read_model(MODEL, changes), end_time=0.05)
+        assert table["x"][run] == results["bodies/2/position/x"][-1]
+        assert table["depth"][run] == results["contacts/301/peak_penetration"]
+        assert table["speed"][run] == results["bodies/2/velocity/x"].tolist()
+        assert table["early"][run] == results["bodies/2/velocity/x"][2]
+        assert table["mean"][run] == table["x"][run] / 0.05
+
+
+def test_the_table_is_the_same_for_any_number_of_workers_and_when_one_is_killed(tmp_path):
+    study = read_study(study_file(tmp_path, runs=40))
+    one = bytes_of(study, tmp_path / "one", workers=1)
+    assert bytes_of(study, tmp_path / "two", workers=2) == one
+    rows, workers = {}, Workers(study, 2)
+    for row in workers.rows(range(40)):
+        rows[row.run] = row
+        if len(rows) in (5, 15):
+            busy = next(w for w in workers._workers if w.runs)
+            os.kill(busy.process.pid, signal.SIGKILL)
+    assert workers.died == 2
+    keys = [study.key(run, model_digest(study)) for run in range(40)]
+    write_table(tmp_path / "killed.parquet", study, keys, [rows[run] for run in range(40)])
+    assert (tmp_path / "killed.parquet").read_bytes() == one
+
+
+def test_a_run_that_kills_its_worker_is_a_row_and_is_tried_once_more_on_resume(tmp_path):
+    (tmp_path / "deadly.py").write_text(
+        "import os\n"
+        "def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):\n"
+        "    if par[0] > 0.25:\n"
+        "        os._exit(7)\n"
+        "    return [0.0, 0.0, 0.0]\n"
+    )
+    shutil.copy(MODEL, tmp_path / "ball.xml")
+    text = STUDY.replace("{{ low = 0.1, high = 0.3 }}", "{{ values = [0.1, 0.3, 0.2] }}")
+    text = text.replace('design = "latin_hypercube"\nruns = {runs}', 'design = "grid"')
+    text = text.replace('low = 5e7, high = 2e8, scale = "log"', "values = [1e8]")
+    text = text.replace("[set]", '[set]\n"Force_Contact[301].script_name" = "deadly.py"')
+    study = read_study(study_file(tmp_path, text, end=0.02, model="ball.xml"))
+    swept = sweep(study, tmp_path / "out", workers=2)
+    assert swept.counts == {"finished": 2, "failed": 1}
+    assert swept.reasons == [(1, f"its process died {MOST_TRIES} times, exit code 7")]
+    table = Responses(swept.table)
+    assert table["status"].tolist() == ["finished", "failed", "finished"]
+    assert np.isnan(table["x"][1])
+    assert sweep(study, tmp_path / "out", workers=1, resume=True).kept == 2
+
+
+def test_a_broken_study_goes_on_where_it_was(tmp_path):
+    study = read_study(study_file(tmp_path))
+    whole = bytes_of(study, tmp_path / "out", workers=1)
+    journal = tmp_path / "out" / "ball.rows"
+    lines = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(b"".join(lines[:7]) + lines[7][:40])  # killed while it wrote
+    done = []
+    swept = sweep(
+        study, tmp_path / "out", workers=1, resume=True, progress=lambda n, of: done.append((n, of))
+    )
+    assert swept.kept == 7
+    assert done[0] == (7, 12)
+    assert done[-1] == (12, 12)
+    assert swept.table.read_bytes() == whole
+    keys = {study.key(run, model_digest(study)): run for run in range(12)}
+    assert sorted(rows_kept(journal, keys)) == list(range(12))
+
+
+def test_rows_of_other_runs_are_not_taken(tmp_path):
+    study = read_study(study_file(tmp_path))
+    sweep(study, tmp_path / "out", workers=1)
+    for text in (
+        STUDY.replace("seed = 3", "seed = 4"),
+        STUDY.replace("[run]", "[run]\ntol = 1e-6"),
+        STUDY.replace("0.9*mu", "0.8*mu"),
+        STUDY.replace("at = 0.02", "at = 0.03"),
+    ):
+        other = read_study(study_file(tmp_path, text))
+        keys = {other.key(run, model_digest(other)): run for run in range(12)}
+        assert rows_kept(tmp_path / "out" / "ball.rows", keys) == {}, text
+    # a longer study of the same seed may have some of them
+    more = read_study(study_file(tmp_path, STUDY.replace("latin_hypercube", "sobol"), runs=8))
+    sweep(more, tmp_path / "more", workers=1)
+    more = read_study(study_file(tmp_path, STUDY.replace("latin_hypercube", "sobol"), runs=16))
+    assert sweep(more, tmp_path / "more", workers=1, resume=True).kept == 8
+
+
+def test_a_deck_or_script_that_changes_makes_other_runs(tmp_path):
+    script = (PACKAGES / "userfuncs" / "coulomb_stribeck.py").read_text()
+    (tmp_path / "own.py").write_text(script)
+    deck = MODEL.read_text().replace("../userfuncs/coulomb_stribeck.py", "own.py")
+    (tmp_path / "ball.xml").write_text(deck)
+    study = read_study(study_file(tmp_path, model="ball.xml"))
+    found = {model_digest(study)}
+    (tmp_path / "own.py").write_text(script + "\n# changed\n")
+    found.add(model_digest(study))
+    (tmp_path / "ball.xml").write_text(deck.replace('mass="5"', 'mass="6"'))
+    found.add(model_digest(study))
+    assert len(found) == 3
+
+
+def test_what_fails_and_what_warns_is_marked(tmp_path):
+    text = STUDY.replace("[set]", '[set]\n"Body_Rigid[2].mass" = "{{10*(mu-0.15)}}"')
+    text = text.replace("at = 0.02", "at = 0.025")  # between output rows
+    study = read_study(study_file(tmp_path, text))
+    swept = sweep(study, tmp_path / "out", workers=1)
+    table = Responses(swept.table)
+    light = table["mu"] < 0.15
+    assert 0 < light.sum() < 12
+    assert (table["status"] == np.where(light, "failed", "warned")).all()
+    for reason in table["reason"][light]:
+        assert "mass" in reason
+    for reason in table["reason"][~light]:
+        assert reason == "outputs.early: no output row at time 0.025"
+    assert np.isnan(table["early"]).all()
+    assert not np.isnan(table["x"][~light]).any()
+
+
+def test_a_study_of_which_no_run_ends_is_an_error(tmp_path):
+    text = STUDY.replace("[run]", "[run]\nmost_evaluations = 3")
+    with pytest.raises(SolverError, match="not one of 12 runs came to its end: TooMuchWork"):
+        sweep(read_study(study_file(tmp_path, text)), tmp_path / "out", workers=1)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("bodies/2/position/x", "bodies/9/position/x"), "outputs: bodies/9/position/x: this"),
+        (("301].stiffness", "302].stiffness"), r"no Force_Contact\[302\]"),
+        (("[run]", '[run]\nintegrator = "NONE"'), "NONE"),
+    ],
+)
+def test_what_no_run_can_do_is_said_before_the_first(tmp_path, change, said):
+    study = read_study(study_file(tmp_path, STUDY.replace(*change)))
+    with pytest.raises(ModelError, match=said):
+        sweep(study, tmp_path / "out", workers=1)
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_command(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    file = study_file(tmp_path, STUDY.replace("seed = 3", "seed = 3\nkeep = [2]"))
+    runner = CliRunner()
+    found = runner.invoke(main, ["sweep", str(file), "--workers", "1", "--json"])
+    assert found.exit_code == 0, found.output
+    about = json.loads(found.stdout)
+    assert about["runs"] == about["finished"] == 12
+    assert about["table"] == "ball/ball.parquet"
+    table = Responses(tmp_path / "ball" / "ball.parquet")
+    with open_results(tmp_path / "ball" / "run-2" / "bowling_ball.h5") as results:
+        assert results["bodies/2/position/x"][-1] == table["x"][2]
+    found = runner.invoke(main, ["sweep", str(file), "--only", "4"])
+    assert found.output == "ball/run-4: finished\n"
+    found = runner.invoke(main, ["plot", "ball/ball.parquet", "x", "mu", "-o", "x.svg"])
+    assert found.output == "x.svg: 1 x 1 panels, 12 runs\n"
+    found = runner.invoke(main, ["plot", "ball/ball.parquet", "nothing"])
+    assert found.exit_code == 2
+    assert "no column nothing to draw; there is k, mu, x" in found.output
+    found = runner.invoke(main, ["sweep", str(file), "--only", "12"])
+    assert found.exit_code == 2
+    assert "no run 12; runs are 0 to 11" in found.output
+
+
+def free_port():
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]
+
+
+def test_a_cluster_makes_the_same_table_though_its_workers_are_killed(tmp_path):
+    pytest.importorskip("distributed")
+    study = read_study(study_file(tmp_path, runs=200))
+    one = bytes_of(study, tmp_path / "one", workers=2)
+    address = f"tcp://127.0.0.1:{free_port()}"
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": tmp_path}
+    dask = [sys.executable, "-m", "dask"]
+    started = [
+        subprocess.Popen(
+            [*dask, "scheduler", "--host", "127.0.0.1", "--port", address.split(":")[-1]],
+            **quiet,
+        )
+    ]
+
+    def worker():
+        options = ["--nthreads", "1", "--no-nanny", "--no-dashboard"]
+        started.append(subprocess.Popen([*dask, "worker", address, *options], **quiet))
+
+    def disturb(done, of):
+        # one dies in the midst, and another takes its place
+        if done in (60, 120):
+            started[1 if done == 60 else 2].kill()
+            worker()
+            time.sleep(1.0)
+
+    try:
+        worker()
+        worker()
+        swept = sweep(study, tmp_path / "dask", scheduler=address, progress=disturb)
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+    assert swept.counts == {"finished": 200}
+    assert swept.table.read_bytes() == one
+
+
+def test_a_scheduler_that_does_not_answer(tmp_path, monkeypatch):
+    pytest.importorskip("distributed")
+    from mbsim.studies import cluster
+
+    monkeypatch.setattr(cluster, "PATIENCE", 0.5)
+    address = f"tcp://127.0.0.1:{free_port()}"
+    with pytest.raises(ModelError, match="no scheduler answers"):
+        sweep(read_study(study_file(tmp_path)), tmp_path / "out", scheduler=address)
