@@ -134,8 +134,8 @@ class Recorder:
         check_requests(system.model)
         if asked:
             self._asked.check(names_of(system))
-        self._settings: dict[str, Value] = dict(attributes)
-        self._settings.update({} if self._bare else self._identity.digests)
+        digests = {} if self._bare else self._identity.digests
+        self._settings: dict[str, Value] = {**attributes, **digests}
         if directory is not None:
             prepare_directory(directory, system.model.name)
             self._target = directory / f"{system.model.name}.h5"
@@ -154,8 +154,7 @@ class Recorder:
         if resume:
             # what a run that ended outside its loop has recorded since is recorded again
             self._store.shorten(partial(length_of, self._written))
-        asked, shown = self._asked, not self._bare
-        new = Before({}, {}, {}) if resume else before_rows(self.system, asked, shown)
+        new = Before({}, {}, {}) if resume else before_rows(self.system, self._asked, not self._bare)
         new.attributes["/"] = {**self._settings, "status": "running"}
         self._store.update(**new._asdict(), remove=["stats", "audit"])
 
