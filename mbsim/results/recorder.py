@@ -101,8 +101,7 @@ class Recorder:
     ) -> None:
         self.system, self._bare = system, bare and directory is None
         self._asked = SignalFilter(asked)
-        self._identity = Identity(system, how)
-        self.directory = directory
+        self._identity, self.directory = Identity(system, how), directory
         self.checkpoint: dict[str, Table] = {}
         self._watch = Watch(acting(system))
         self._watched = 0  # of the rows gathered, how many it has looked at
@@ -154,7 +153,8 @@ class Recorder:
         if resume:
             # what a run that ended outside its loop has recorded since is recorded again
             self._store.shorten(partial(length_of, self._written))
-        new = Before({}, {}, {}) if resume else before_rows(self.system, self._asked, not self._bare)
+        shown = not self._bare
+        new = Before({}, {}, {}) if resume else before_rows(self.system, self._asked, shown)
         new.attributes["/"] = {**self._settings, "status": "running"}
         self._store.update(**new._asdict(), remove=["stats", "audit"])
 
