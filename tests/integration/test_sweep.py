@@ -236,6 +236,7 @@ def free_port():
         return one.getsockname()[1]
 
 
+@pytest.mark.slow
 def test_a_cluster_makes_the_same_table_though_its_workers_are_killed(tmp_path):
     pytest.importorskip("distributed")
     study = read_study(study_file(tmp_path, runs=200))
