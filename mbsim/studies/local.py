@@ -89,9 +89,10 @@ class Workers:
             most = 1
             while self._waiting or any(worker.runs for worker in self._workers):
                 self._hand_out(most)
-                busy = {w.connection: w for w in self._workers if w.runs}
-                for connection in wait(list(busy)):
-                    row = self._take(busy[connection])  # type: ignore[index]
+                busy = [worker for worker in self._workers if worker.runs]
+                ready = wait([worker.connection for worker in busy])
+                for worker in busy:
+                    row = self._take(worker) if worker.connection in ready else None
                     if row is None:
                         continue
                     yield row
