@@ -6,6 +6,7 @@ import functools
 import hashlib
 import json
 import re
+import sys
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
@@ -173,11 +174,11 @@ def read_study(file: str | Path) -> Study:
 
 def _load(path: Path) -> dict[str, Any]:
     """Return the tables of a TOML file."""
-    try:
+    if sys.version_info >= (3, 11):
         import tomllib
-    except ImportError:  # Python 3.10
+    else:
         try:
-            import tomli as tomllib  # type: ignore[no-redef,import-not-found,unused-ignore]
+            import tomli as tomllib
         except ImportError:
             raise ModelError('study files need: pip install "mbsim-contact[studies]"') from None
     try:
