@@ -6,7 +6,6 @@ import json
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from mbsim.errors import ResultsError
@@ -36,15 +35,8 @@ class Journal:
             raise ResultsError(f"{path}: cannot be written: {error.strerror}") from None
         self._since = 0
 
-    def __enter__(self) -> Journal:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Close the file."""
         self._stream.close()
 
     def add(self, key: str, row: Row) -> None:

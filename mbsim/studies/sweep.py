@@ -7,7 +7,7 @@ import json
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -98,7 +98,7 @@ def sweep(
     if progress is not None:
         progress(kept, len(same))
     try:
-        with Journal(path, resume) as journal:
+        with closing(Journal(path, resume)) as journal:
             for row in _rows(study, left, workers, scheduler):
                 journal.add(keys[row.run], row)
                 found[row.run] = row
