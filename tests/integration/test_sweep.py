@@ -9,7 +9,7 @@ import signal
 import socket
 import subprocess
 import sys
-import time
+import threading
 
 import numpy as np
 import pytest
@@ -236,6 +236,20 @@ def free_port():
         return one.getsockname()[1]
 
 
+def joining(stream):
+    """Return the event of a Dask worker having joined its scheduler; all that it says is read."""
+    joined = threading.Event()
+
+    def listen():
+        with stream:
+            for line in stream:
+                if "Registered to" in line:
+                    joined.set()
+
+    threading.Thread(target=listen, daemon=True).start()
+    return joined
+
+
 @pytest.mark.slow
 def test_a_cluster_makes_the_same_table_though_its_workers_are_killed(tmp_path):
     pytest.importorskip("distributed")
@@ -253,14 +267,15 @@ def test_a_cluster_makes_the_same_table_though_its_workers_are_killed(tmp_path):
 
     def worker():
         options = ["--nthreads", "1", "--no-nanny", "--no-dashboard"]
-        started.append(subprocess.Popen([*dask, "worker", address, *options], **quiet))
+        heard = {**quiet, "stderr": subprocess.PIPE, "text": True}
+        started.append(subprocess.Popen([*dask, "worker", address, *options], **heard))
+        return joining(started[-1].stderr)
 
     def disturb(done, of):
         # one dies in the midst, and another takes its place
         if done in (60, 120):
             started[1 if done == 60 else 2].kill()
-            worker()
-            time.sleep(1.0)
+            assert worker().wait(60.0)
 
     try:
         worker()
