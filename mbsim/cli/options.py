@@ -37,3 +37,28 @@ def set_option(what: str) -> Decorator:
 def json_option(what: str) -> Decorator:
     """Return --json, which a command takes as `as_json`; `what` it prints."""
     return click.option("--json", "as_json", is_flag=True, help=f"Print {what}.")
+
+
+def folder_option(what: str, default: str) -> Decorator:
+    """Return -o for a folder, which a command takes as `output`; `what` it is for."""
+    return click.option(
+        "-o",
+        "output",
+        type=click.Path(path_type=Path),
+        metavar="DIR",
+        help=f"Folder for {what}.  [default: {default}]",
+    )
+
+
+def resume_option(what: str) -> Decorator:
+    """Return --resume; `what` it does."""
+    return click.option("--resume", is_flag=True, help=f"{what}.")
+
+
+progress_option = click.option(
+    "--progress",
+    type=click.Choice(["auto", "off"]),
+    default="auto",
+    show_default=True,
+    help="auto: shown where standard error is a terminal.",
+)

@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mbsim.cli.messages import counted, echo
-from mbsim.cli.options import json_option, plugin_option, set_option
+from mbsim.cli.options import (
+    folder_option,
+    json_option,
+    plugin_option,
+    progress_option,
+    resume_option,
+    set_option,
+)
 from mbsim.integrators.catalog import METHODS
 
 if TYPE_CHECKING:
@@ -23,13 +30,7 @@ _METHODS = ", ".join(f"{name} ({what})" for name, what in METHODS.items())
 
 @click.command("run")
 @click.argument("model", type=click.Path())
-@click.option(
-    "-o",
-    "output",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Folder for results.  [default: <model name>/]",
-)
+@folder_option("results", "<model name>/")
 @plugin_option("File with user subroutines")
 @set_option("Change an attribute of the deck")
 @click.option(
@@ -45,14 +46,8 @@ _METHODS = ", ".join(f"{name} ({what})" for name, what in METHODS.items())
 )
 @click.option("--end-time", type=float, metavar="T", help="Instead of the deck's.")
 @click.option("--print-interval", type=float, metavar="DT", help="Between output rows.")
-@click.option("--resume", is_flag=True, help="Go on from the last checkpoint in DIR.")
-@click.option(
-    "--progress",
-    type=click.Choice(["auto", "off"]),
-    default="auto",
-    show_default=True,
-    help="auto: shown where standard error is a terminal.",
-)
+@resume_option("Go on from the last checkpoint in DIR")
+@progress_option
 @json_option("the end state as one JSON object")
 @click.option(
     "--detector",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from mbsim.cli.messages import counted, echo, warn
-from mbsim.cli.options import json_option
+from mbsim.cli.options import folder_option, json_option, progress_option, resume_option
 
 if TYPE_CHECKING:
     from mbsim.studies.study import Study
@@ -21,13 +21,7 @@ _MOST_REASONS = 3
 
 @click.command("sweep")
 @click.argument("file", type=click.Path(path_type=Path), metavar="STUDY.toml")
-@click.option(
-    "-o",
-    "output",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Folder for the table.  [default: <study name>/]",
-)
+@folder_option("the table", "<study name>/")
 @click.option(
     "--workers",
     type=click.IntRange(min=1),
@@ -39,7 +33,7 @@ _MOST_REASONS = 3
     metavar="ADDRESS",
     help="Let a Dask cluster run them, e.g. tcp://host:8786; its page shows what goes on.",
 )
-@click.option("--resume", is_flag=True, help="Keep the rows that DIR has of the same runs.")
+@resume_option("Keep the rows that DIR has of the same runs")
 @click.option(
     "--only",
     multiple=True,
@@ -47,13 +41,7 @@ _MOST_REASONS = 3
     metavar="RUN",
     help="Run this one only, and write all its results into DIR/run-RUN; may be repeated.",
 )
-@click.option(
-    "--progress",
-    type=click.Choice(["auto", "off"]),
-    default="auto",
-    show_default=True,
-    help="auto: shown where standard error is a terminal.",
-)
+@progress_option
 @json_option("what came of it as one JSON object")
 def command(
     file: Path,
