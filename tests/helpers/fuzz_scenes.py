@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
+
 import numpy as np
 
 from helpers import random_decks
@@ -24,24 +26,13 @@ def heap(rng, writer):
         writer.body(id, mass, inertia_of(rng, mass), rng.normal(scale=0.2, size=3), spin)
         shape(rng, writer, kind, 200 + k, 10 * id)
     gravity(writer)
-    said = contact(rng, writer, 200, 100)
-    contacts = [(200 + k, 100) for k in range(1, count)]
-    contacts += [(200 + k, 199 + k) for k in range(1, count)]
-    for i, j in contacts:
-        one_more(writer, i, j)
+    pairs = [(200 + k, 100) for k in range(count)]
+    pairs += [(200 + k, 199 + k) for k in range(1, count)]
+    laws = deepcopy(rng)
+    for k, (i, j) in enumerate(pairs):
+        # all of the same laws
+        said = contact(rng if k == 0 else deepcopy(laws), writer, i, j, id=1 + k)
     return f"{' '.join(kinds)} {said[0]} {said[1]}", 0.6
-
-
-def one_more(writer, i, j):
-    """Add a contact of the laws of the last one between two other graphics."""
-    last = next(line for line in reversed(writer.lines) if line.startswith("<Force_Contact"))
-    number = sum(line.startswith("<Force_Contact") for line in writer.lines) + 1
-    words = last.split()
-    for k, word in enumerate(words):
-        for name, value in (("id", number), ("i_graphics_id", i), ("j_graphics_id", j)):
-            if word.startswith(f'{name}="'):
-                words[k] = f'{name}="{value}"'
-    writer.lines.append(" ".join(words))
 
 
 def slide(rng, writer):

@@ -138,7 +138,7 @@ def swapped(rng, root, size):
 
 
 def idle(rng, root, size):
-    """Add a heavy body on the ground's own fixed joint and a free one, far off and untouched."""
+    """Add a free body that turns, far off and untouched."""
     model = root.find("Model")
     taken = [int(v) for e in root.iter() for n, v in e.attrib.items() if n == "id"]
     body = max(taken) + 1

@@ -145,7 +145,7 @@ def shape(rng, writer, kind, id, marker):
     writer.add("Post_Graphic", **facts)
 
 
-def contact(rng, writer, i, j, implicit_only=True):
+def contact(rng, writer, i, j, id=1):
     """Add a contact of random laws between two graphics."""
     F, L, T = writer.F, writer.L, writer.T
     stiffness = 10.0 ** rng.uniform(4.0, 7.0)
@@ -185,7 +185,7 @@ def contact(rng, writer, i, j, implicit_only=True):
         friction["bristle_damping"] = 10.0 * L / (F * T)
     writer.add(
         "Force_Contact",
-        id=1,
+        id=id,
         num_i_graphics=1,
         i_graphics_id=i,
         num_j_graphics=1,

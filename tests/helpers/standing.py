@@ -129,9 +129,7 @@ class Case:
         seen = {b: (p[::every], R[::every]) for b, (p, R) in seen.items()}
         far = apart(expected(self.poses), seen)
         loose = max(self.asked(method, tol), self.asked(self.method, self.tol))
-        # what rounding makes of coordinates that are large beside the sizes
-        rounding = 1e4 * np.finfo(float).eps if name == "shifted" else 0.0
-        allowed = (AGREE * loose + AGREE * rounding / PUSH * loose) * self.growth
+        allowed = AGREE * loose * self.growth
         compared = self.growth < HORIZON
         worst = np.where(compared, far / allowed, 0.0)
         k = int(np.argmax(worst))
