@@ -152,7 +152,7 @@ def _creep(contact: Contact, meetings: list[_Meeting]) -> Iterator[str]:
         zero = (0.0, 0.0, 0.0)
         inputs = FrictionInput(
             *(0.0, 0.0, zero, (speed, 0.0, 0.0), (0.0, 0.0), 1.0, 0.0, 0.0, zero, zero),
-            *(0.0, 0.0, 0.0, 0.0, math.nan, 0.0, math.nan, math.nan),
+            *(0.0, 0.0, 0.0, 0.0, math.nan, 0.0, math.nan, math.nan, math.nan),
         )
         return -float(law.force(inputs, *par)[0])
 

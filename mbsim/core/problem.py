@@ -32,7 +32,8 @@ to the committed one before the run ends, but for codes from AT_ONCE on.
 |         |                        | a look: the next one                                       |
 | switch- | y, out (h: ASK, ...)   | 1 if a force is on another branch than at the committed    |
 | ing     |                        | point, 2 if that shall be found exactly, else 0; PASS, of  |
-|         |                        | a step that was taken: 1 if one changed in it; LOAD: 1 if  |
+|         |                        | a step that was taken, PASS_CUT, of one that was cut at a  |
+|         |                        | switch: 1 if one changed in it; LOAD: 1 if                 |
 |         |                        | friction holds something, the largest force by which it    |
 |         |                        | does over what it can in out[0]; BENDS (b: y committed): 1 |
 |         |                        | if HALF, at the step's middle, then HALVES, at its end,    |
@@ -200,7 +201,7 @@ WATCH_EVERY = 5000
 # what `switching` is asked: whether sides differ, to keep them too, that a step was taken, loads;
 # and of friction that follows a way in closed form: whether that bends, then two halves of the
 # step; whether a side may have changed twice
-ASK, SETTLE, PASS, LOAD, BENDS, HALF, HALVES, HIDES = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0
+ASK, SETTLE, PASS, PASS_CUT, LOAD, BENDS, HALF, HALVES, HIDES = map(float, range(9))
 
 # reasons given to `reject`
 BY_ERROR, BY_CHECK, BY_NOT_FINITE, BY_NEWTON, BY_JUMP = range(5)

@@ -13,7 +13,18 @@ from numba import types
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import ASK, BENDS, HALF, HALVES, HIDES, LOAD, PASS, SETTLE, Problem
+from mbsim.core.problem import (
+    ASK,
+    BENDS,
+    HALF,
+    HALVES,
+    HIDES,
+    LOAD,
+    PASS,
+    PASS_CUT,
+    SETTLE,
+    Problem,
+)
 from mbsim.integrators.scheme import (
     LAST_ERROR,
     LOAD_THEN,
@@ -213,7 +224,8 @@ def serve(context: int, what: int, t: float, h: float, whole: float) -> float:
     elif what == BEGIN:
         ask_switching(p, m, t, SETTLE, m.y, m.error)
     else:
-        changed = ask_switching(p, m, t + h, PASS, m.trial, m.error) > 0
+        passed = PASS_CUT if m.memory[SWITCH_CUT] == 1.0 else PASS
+        changed = ask_switching(p, m, t + h, passed, m.trial, m.error) > 0
         in_vain = m.memory[SWITCH_CUT] == 1.0 and not changed
         m.memory[VAIN] = m.memory[VAIN] + 1.0 if in_vain else 0.0
     return 0.0

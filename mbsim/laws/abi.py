@@ -30,13 +30,13 @@ from mbsim.laws.catalog import FrictionInput, FrictionLaw, NormalLaw
 #: Results of a normal law.
 LOAD, ELASTIC, ENERGY = range(3)
 
-FRICTION_INPUTS = 27
+FRICTION_INPUTS = 28
 #: Where the fields of `FrictionInput` begin in the numbers that a friction law is given.
 TIME_IN, STEP_IN, X_IN, XDOT_IN, ROLLING_IN, NFORCE_IN = 0, 1, 2, 5, 8, 10
 AREA_IN, RADIUS_IN, LOCI_IN, LOCJ_IN = 11, 12, 13, 16
 #: Those that only derivatives and laws with memory look at.
 DFLAG, FROZEN, NORMAL_STIFFNESS, SLIPPING_MASS, SLIDING_LIMIT, GROWTH = range(19, 25)
-NORMAL_RATE, LIMIT_RATE = range(25, FRICTION_INPUTS)
+NORMAL_RATE, LIMIT_RATE, STIFFNESS_RATE = range(25, FRICTION_INPUTS)
 #: Fields of a law's output before its memory.
 FORCE_X_OUT, FORCE_Y_OUT, TORQUE_X_OUT, TORQUE_Y_OUT, TORQUE_Z_OUT = range(5)
 STORED_OUT, MODE_OUT, BRANCH_OUT, SIZE_OUT, UNIT_OUT, MEMORY_OUT = range(5, 11)
@@ -68,6 +68,7 @@ def friction_input(a: F1) -> FrictionInput:
         a[GROWTH],
         a[NORMAL_RATE],
         a[LIMIT_RATE],
+        a[STIFFNESS_RATE],
     )
 
 

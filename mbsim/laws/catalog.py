@@ -120,6 +120,7 @@ class FrictionInput(NamedTuple):
     growth: float  # of that stiffness, over itself [1/T]
     nforce_rate: float  # of the normal force [F/T], NaN where it is not known
     limit_rate: float  # of `limit`, likewise
+    stiffness_rate: float  # of `stiffness` [F/(L T)] where `growth` cannot know it, else NaN
 
 
 Law = TypeVar("Law", bound=Callable[..., Any])

@@ -107,6 +107,7 @@ class Slider:
             growth=0.0,
             nforce_rate=math.nan,
             limit_rate=math.nan,
+            stiffness_rate=math.nan,
         )
         return self.sample.ask(inputs, memory)
 

@@ -42,7 +42,7 @@ def slip(
 ):
     inputs = FrictionInput(
         *(0.0, 0.0, at, (x, y, spin), rolling, nforce, 0.0, 0.0, ZERO, ZERO),
-        *(0.0, frozen, stiffness, 1.0, math.nan, 0.0, math.nan, math.nan),
+        *(0.0, frozen, stiffness, 1.0, math.nan, 0.0, *(math.nan,) * 3),
     )
     return inputs._replace(**others)
 
@@ -392,6 +392,28 @@ def test_stiction_keeps_its_mode_within_a_step():
         out, _ = law.force(asked, kept[:12], *par)
         assert out[6] == mode
         assert out[0] == pytest.approx(-3.0)
+
+
+@pytest.mark.parametrize("rate", [-2e7, 0.0, 2e7])
+@pytest.mark.parametrize("nforce_rate", [-1e3, 0.0, 1e3])
+def test_stick_and_slip_are_decided_by_the_same_rate_of_the_limit(rate, nforce_rate):
+    """A patch grows stiffer whatever its depth does: what sticks must not ask to slip at once."""
+    law, k = FRICTION_LAWS["STICTION"], 1e4
+    of_depth = {"tangential_stiffness": math.nan, "poisson_ratio": 0.3}
+    par = parameters(law, tangential_damping=0.0, mu_static=0.3, mu_dynamic=0.3, **of_depth)
+    stiffness = k * (2.0 - 0.3) / (2.0 * (1.0 - 0.3))
+    most, stretch = 3.0, 3.0 / k
+    own = 0.3 * nforce_rate / k - stretch * rate / stiffness
+    rates = {"nforce_rate": nforce_rate, "stiffness_rate": rate, "stiffness": stiffness}
+    for v, mode in ((own + 1e-3, SLIP), (own - 1e-3, STICK)):
+        asked = slip(v, 0.0, frozen=1.0, time=1.0, **rates)
+        # it slips in the direction of z, or has just come to stick, a rounding beyond the limit
+        slips = (0.0, 0.0, stretch, 0.0, 0.0, 0.0, v / stretch, 0.0, 1.0, 0.0, 0.0, SLIP)
+        sticks = (stretch * (1.0 + 1e-12), *slips[1:11], STICK)
+        for memory in (slips, sticks):
+            out, _ = law.force(asked, memory, *par)
+            assert out[6] == mode
+            assert -out[0] == pytest.approx(most)
 
 
 def test_a_twist_is_held_up_to_its_limit():

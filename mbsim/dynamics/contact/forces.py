@@ -97,8 +97,10 @@ PATCH, TILTING = 15, 16
 # user's own friction of sliding
 BRANCH, UNIT, ALONG_X, ALONG_Y, STIFFENS, LIMIT = range(17, 23)
 # the rates of normal force and of that, as found at a time; both as they were there; over how much
-# time they are still to be found, else 0
+# time they are still to be found, else 0; the same of STIFFNESS, where more than the depth changes
+# it, else NaN
 NORMAL_SLOPE, LIMIT_SLOPE, FOUND_AT, NORMAL_THEN, LIMIT_THEN, FOUND_OVER = range(23, 29)
+STIFFNESS_SLOPE, STIFFNESS_THEN = 29, 30
 
 # part by which k d/F has to be off 1 for a normal force's stiffness to change with its depth
 CHANGES = 1e-9

@@ -20,6 +20,7 @@ from mbsim.dynamics.contact.forces import (
     NORMAL_SLOPE,
     STIFFENS,
     STIFFNESS,
+    STIFFNESS_SLOPE,
     UNIT,
     contact_of,
     sides,
@@ -40,6 +41,7 @@ from mbsim.laws.abi import (
     NORMAL_STIFFNESS,
     SLIDING_LIMIT,
     SLIPPING_MASS,
+    STIFFNESS_RATE,
     STORED_OUT,
     TIME_IN,
     UNIT_OUT,
@@ -71,6 +73,7 @@ def remember(scene: Scene, y: F1, s: int) -> None:
     known = row[FOUND_AT] == given[TIME_IN]
     given[NORMAL_RATE] = row[NORMAL_SLOPE] if known else math.nan
     given[LIMIT_RATE] = row[LIMIT_SLOPE] if known else math.nan
+    given[STIFFNESS_RATE] = row[STIFFNESS_SLOPE] if known else math.nan
     for k in range(scene.contacts.memory[c]):
         if k < carried:
             given[at + k] = y[z + k]

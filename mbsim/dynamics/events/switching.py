@@ -28,7 +28,7 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, vector_at, view
 from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import ASK, BENDS, HALF, HALVES, HIDES, LOAD, PASS
+from mbsim.core.problem import ASK, BENDS, HALF, HALVES, HIDES, LOAD, PASS, PASS_CUT
 from mbsim.core.rotation import norm, vector
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.constraints.in_use import is_friction
@@ -49,8 +49,11 @@ from mbsim.dynamics.contact.forces import (
     RATE,
     SLIP,
     STIFFNESS,
+    STIFFNESS_SLOPE,
+    STIFFNESS_THEN,
     UNIT,
     contact_of,
+    face_weight_of,
 )
 from mbsim.dynamics.contact.memory import slipping_mass
 from mbsim.dynamics.expressions.jets import value
@@ -148,7 +151,9 @@ def decide(scene: Scene, context: int, t: float, y: F1) -> None:
         if scene.state.touching[s] == 1 and row[BRANCH] == UNDECIDED:
             h, found = ahead_of(scene, s), True
             row[FOUND_AT], row[NORMAL_THEN], row[LIMIT_THEN] = t, row[NORMAL], row[LIMIT]
-            row[FOUND_OVER] = h
+            row[FOUND_OVER], row[STIFFNESS_SLOPE] = h, math.nan
+            # of a patch: it is not a function of the depth alone
+            row[STIFFNESS_THEN] = row[STIFFNESS] if face_weight_of(scene, s) > 0.0 else math.nan
             if h == 0.0:
                 row[NORMAL_SLOPE] = row[STIFFNESS] * row[RATE]
                 part = row[LIMIT] / row[NORMAL] if row[NORMAL] > 0.0 else 0.0
@@ -167,6 +172,7 @@ def decide(scene: Scene, context: int, t: float, y: F1) -> None:
                 row[FOUND_OVER] = 0.0
                 row[NORMAL_SLOPE] = (row[NORMAL] - row[NORMAL_THEN]) / h
                 row[LIMIT_SLOPE] = (row[LIMIT] - row[LIMIT_THEN]) / h
+                row[STIFFNESS_SLOPE] = (row[STIFFNESS] - row[STIFFNESS_THEN]) / h
         h = longest_ahead(scene, t)
     look_at(scene, context, t, y, work.idle)
 
@@ -194,7 +200,7 @@ def watch_sticking(scene: Scene, t: float, y: F1, what: float) -> int:
     step is taken now and then; one that was cut a little before a change is none.
     """
     chattering, differs = scene.state.chattering, 0
-    if what == PASS:
+    if what == PASS or what == PASS_CUT:
         differs, before = 1 if chattering[ASKS] == 1.0 else 0, chattering[CHANGES]
         chattering[CHANGES] = before + 1.0 if differs == 1 else 0.5 * before
         chattering[ASKS] = 0.0
@@ -236,6 +242,7 @@ def watch(scene: Scene, context: int, t: float, y: F1, what: float) -> int:
     Unless it is only asked, the sides are kept. Of a step that was taken: 1 if one changed in it.
     """
     sides, differs, last = scene.state.sides, 0, len(scene.switching.program) - 1
+    passed = what == PASS or what == PASS_CUT
     if scene.switching.program[last] < 0 and scene.switching.force[last] < 0:
         # what friction does follows from all the rest
         look_at(scene, context, t, y, scene.work.idle)
@@ -255,13 +262,14 @@ def watch(scene: Scene, context: int, t: float, y: F1, what: float) -> int:
         leaves = now != scene.state.dry[f, SLIDES] if keeps else exact or other
         # a jump is found exactly too: what is wrong of one goes with the part of the step
         jumps = scene.switching.jumps[k] == 1
-        if what == PASS:
+        if passed:
             differs = 1 if other else differs
         elif leaves and sides[k, CHATTERING] <= (
             CHATTERS if k < last or f >= 0 else CHATTERS_MODES
         ):
             differs = max(differs, 2 if exact or jumps else 1)
-        if what == PASS:
+        if passed and (other or what == PASS):
+            # a step that was cut in vain is as short as what chatters makes it: it cools nothing
             sides[k, CHATTERING] = COOLING * sides[k, CHATTERING] + (1.0 if other else 0.0)
         if what != ASK:
             sides[k, SIDE] = now

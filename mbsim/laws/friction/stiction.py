@@ -237,18 +237,8 @@ def stiction(  # noqa: C901
     if k <= 0.0 or inputs.nforce <= 0.0:
         nothing = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, SLIP, SLIP, 1.0, 0.0)
         kept = (px, py) if before == SLIP else (0.0, 0.0)
-        still = (
-            *kept,
-            memory[KEPT_Z],
-            memory[KEPT_Z + 1],
-            *kept,
-            0.0,
-            0.0,
-            time,
-            -inputs.x[2],
-            0.0,
-            SLIP,
-        )
+        z = (memory[KEPT_Z], memory[KEPT_Z + 1])
+        still = (*kept, *z, *kept, 0.0, 0.0, time, -inputs.x[2], 0.0, SLIP)
         return nothing, (*still, 0.0, 0.0)
     c, heavy = tangential_damping, math.sqrt(k * inputs.mass)
     if math.isnan(c):
@@ -257,6 +247,10 @@ def stiction(  # noqa: C901
     # where k grows the force stays, if it is to
     eases = of_depth and incremental == 1.0
     ease = max(0.0, growth) if eases else 0.0
+    # and as it is known where modes are decided: that of a patch is no function of the depth
+    changes = growth
+    if of_depth and not math.isnan(inputs.stiffness_rate):
+        changes = inputs.stiffness_rate / inputs.stiffness
     holds, limit = mu_static * inputs.nforce, _dynamic_limit(inputs, mu_dynamic)
     stretch = limit / k
     follows = max(stretch, math.hypot(v[0], v[1]) * heavy / (k * SHORTEST))
@@ -280,7 +274,7 @@ def stiction(  # noqa: C901
                 change = inputs.limit_rate
             if not math.isnan(change):
                 # how fast z grows by itself, or less where k grows and the force stays
-                own = change / k - stretch * (growth - ease)
+                own = change / k - stretch * (changes - ease)
                 mode = SLIP if along >= own else STICK
             elif since > 0.0:
                 own = abs(stretch - long) / since + stretch * abs(growth)
@@ -309,7 +303,7 @@ def stiction(  # noqa: C901
             if before == BEGUN:
                 zx, zy = zx * holds / (k * length), zy * holds / (k * length)
             if frozen:
-                own = mu_static * inputs.nforce_rate / k - holds / k * (growth - ease)
+                own = mu_static * inputs.nforce_rate / k - holds / k * (changes - ease)
                 sure = 0 if math.isnan(own) else 1
                 mode = SLIP if zx * v[0] + zy * v[1] > own * length else STICK
         most = holds if mode == STICK or (frozen and before == STICK) else limit
