@@ -310,13 +310,15 @@ class Differential:
     """Control_Diff, Adams' DIFF: a state z of the user's own, z' = expr, that starts at `ic`.
 
     Others use z by DIF(id) and z' by DIF1(id). `scale`: below this size of z a local error
-    counts as one of z at this size (manual, error control).
+    counts as one of z at this size (manual, error control). `is_static_hold`: a static analysis
+    leaves z as it is.
     """
 
     id: int
     expr: Expression
     ic: float = 0.0
     scale: float = 1.0
+    is_static_hold: bool = False
     label: str = ""
     source: Source = Source()
 

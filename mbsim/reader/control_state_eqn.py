@@ -71,7 +71,9 @@ CONTROL_STATE_EQN = Statement(
         "d_matrix_id": Spec(ID, "D, outputs by inputs"),
         "num_state": Spec(COUNT, "number of states", "", "that of A"),
         "num_output": Spec(COUNT, "number of outputs", "", "that of C or D"),
-        "is_static_hold": Spec(FLAG, "TRUE where no static analysis is in the deck", "", "FALSE"),
+        "is_static_hold": Spec(
+            FLAG, "TRUE: a static analysis leaves its states as they are", "", "FALSE"
+        ),
         "scale": Spec(  # ours
             Kind("numbers > 0, separated by blanks or commas", _parse_sizes),
             "sizes of the states by which their errors are judged",

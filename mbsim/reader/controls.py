@@ -28,6 +28,7 @@ def _build_differential(entry: Entry) -> None:
         expr=entry.get("expr"),
         ic=entry.get("ic", 0.0),
         scale=entry.get("scale", 1.0),
+        is_static_hold=entry.get("is_static_hold", False),
         label=entry.get("label", ""),
         source=entry.source,
     )
@@ -43,6 +44,7 @@ CONTROL_DIFF = Statement(
         "ic": Spec(REAL, "z at the start", "", "0"),
         "ic_dot": Spec(REAL, note=_NO_SLOPE),
         "is_implicit": Spec(FLAG, refused=_IMPLICIT, harmless="FALSE"),
+        "is_static_hold": Spec(FLAG, "TRUE: a static analysis leaves z as it is", "", "FALSE"),
         "scale": Spec(POSITIVE, "size of z by which its error is judged", "", "1"),  # ours
         **USERSUB_REFUSED,
     },

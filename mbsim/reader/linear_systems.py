@@ -181,6 +181,7 @@ def _expanded(system: LinearSystem, draft: Draft) -> Iterator[tuple[int, list[No
             expr=Expression(f"{system.statement} {system.id}: slope of state {k + 1}", slope),
             ic=starts[k],
             scale=system.scales[k] if system.scales else 1.0,
+            is_static_hold=system.is_static_hold,
             label=f"{system.label or system.statement} {system.id} x{k + 1}",
             source=system.source,
         )
@@ -191,11 +192,7 @@ def _expanded(system: LinearSystem, draft: Draft) -> Iterator[tuple[int, list[No
 
 
 def _inputs(system: LinearSystem, draft: Draft) -> list[Node]:
-    """Return the inputs of a system, and refuse what it cannot have."""
-    settles = any(s.analysis_type == "STATIC" for s in draft.simulations)
-    if system.is_static_hold and settles:
-        message = "a static analysis lets its states go to rest; holding them there is not built"
-        raise _UnfitError(message)
+    """Return the inputs of a system."""
     id = system.arrays.get("u")
     if id is None:
         return []

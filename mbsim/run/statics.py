@@ -66,12 +66,13 @@ def find(
         If there is none, or none is found; `y` stays as it was.
     """
     most = given.max_num_iter or MOST_ITERATIONS
+    loose = _loose_states(system)
     with standing_still(system, t):
         found, where = balance(system.scene, y, hooks, most, given.imbalance)
-        if len(system.scene.states.program):
+        if len(loose):
             # bodies that rest while states stand still are a start, or else what was given
             start = where if found.balanced else y
-            rest = settle_states(system.scene, start, hooks, most)
+            rest = settle_states(system.scene, start, hooks, most, loose)
             if rest.state >= 0:
                 raise SolverError(_unsettled(system, rest, t))
             found, where = balance(system.scene, rest.y, hooks, most, given.imbalance)
@@ -79,9 +80,19 @@ def find(
         raise SolverError(_failure(system, found, t))
     for line in _report(system, found, y, where, t):
         tell(line)
-    if len(system.scene.states.program):
+    count = len(system.scene.states.program)
+    if len(loose):
         tell(f"static: states at rest after {rest.iterations} iterations")
+    if len(loose) < count:
+        tell(f"static: {count - len(loose)} of {count} states are held as they are")
     y[...] = where
+
+
+def _loose_states(system: System) -> Array:
+    """Return the rows of the states that a static analysis lets go to rest."""
+    held = [state.is_static_hold for state in system.model.differentials.values()]
+    count = len(system.scene.states.program)
+    return np.array([k for k in range(count) if k >= len(held) or not held[k]], dtype=np.int64)
 
 
 def _share(found: Balance) -> str:

@@ -81,8 +81,9 @@ def test_a_static_analysis_lets_states_rest():
     held = deck.replace(
         '<Control_StateEqn id="8"', '<Control_StateEqn id="8" is_static_hold="TRUE"'
     )
-    with pytest.raises(DeckError, match="holding them there is not built"):
-        mbsim.read_model(held)
+    kept = mbsim.simulate(mbsim.read_model(held))
+    assert kept["requests/1"][-1, 0] == kept["requests/1"][0, 0] == 0.0
+    assert all(state.is_static_hold for state in mbsim.read_model(held).differentials.values())
 
 
 def test_states_are_named_behind_those_of_the_deck():

@@ -1,5 +1,7 @@
 """Equilibrium of bodies together with the user's own states: forces and slopes z' vanish.
 
+States that are held stay as they are, whatever their slopes are.
+
 Newton's method for displacements along the free directions and all z at once, so that a state
 may also be one whose slope only the bodies change (the integral part of a controller). The
 Jacobian is taken by central differences; a step is the one of least norm, and halved until the
@@ -45,11 +47,11 @@ class _Local:
 
 
 class _States:
-    """The search; unknowns are along the columns of P, then the states."""
+    """The search; unknowns are along the columns of P, then the states `loose` (rows)."""
 
-    def __init__(self, scene: Scene, y: Array, hooks: Hooks) -> None:
+    def __init__(self, scene: Scene, y: Array, hooks: Hooks, loose: Array) -> None:
         self.search = Search(scene, y, hooks)
-        self.offsets, self.scale = scene.states.offset, scene.states.scale
+        self.offsets, self.scale = scene.states.offset[loose], scene.states.scale[loose]
         self.search.move_to(self.search.y)
 
     def residual(self, y: Array, P: Array, R: Array) -> Array | None:
@@ -108,12 +110,13 @@ class _States:
         return False
 
 
-def settle_states(scene: Scene, y: Array, hooks: Hooks, most: int) -> Rest:
+def settle_states(scene: Scene, y: Array, hooks: Hooks, most: int, loose: Array) -> Rest:
     """Return bodies and states at rest, from y on, or which state does not come to rest.
 
-    Bodies that are not yet at rest are left to `equilibrium.balance`.
+    Bodies that are not yet at rest are left to `equilibrium.balance`. `loose` are the rows of the
+    states that are not held, at least one.
     """
-    states, iterations = _States(scene, y, hooks), 0
+    states, iterations = _States(scene, y, hooks, loose), 0
     while iterations < most:
         iterations += 1
         local = states.look()
@@ -122,9 +125,10 @@ def settle_states(scene: Scene, y: Array, hooks: Hooks, most: int) -> Rest:
             break
     local = states.look()
     if local is None:
-        return Rest(states.search.y, iterations, 0, np.nan)
+        return Rest(states.search.y, iterations, int(loose[0]), np.nan)
     n = local.P.shape[1]
     slopes, allowed = local.F[n:], _AT_REST * np.abs(local.J[n:]).sum(axis=1)
     beyond = np.abs(slopes) - allowed
     worst = int(beyond.argmax())
-    return Rest(states.search.y, iterations, worst if beyond[worst] > 0.0 else -1, slopes[worst])
+    state = int(loose[worst]) if beyond[worst] > 0.0 else -1
+    return Rest(states.search.y, iterations, state, slopes[worst])

@@ -29,7 +29,11 @@ def build_differential(entry: Entry) -> None:
     """Add a state."""
     if entry.get("FUNCTION") is not None:
         state = el.Differential(
-            entry.get("id", 0), entry.get("FUNCTION"), entry.get("IC", 0.0), source=entry.source
+            entry.get("id", 0),
+            entry.get("FUNCTION"),
+            entry.get("IC", 0.0),
+            is_static_hold=entry.get("STATIC_HOLD", False),
+            source=entry.source,
         )
         entry.register(entry.draft.differentials, state)
 

@@ -306,7 +306,7 @@ STATEMENTS = (
             **_ID,
             "FUNCTION": Spec(EXPRESSION, required=True),
             "IC": Spec(REAL),
-            "STATIC_HOLD": Spec(FLAG, note=_HARMLESS),
+            "STATIC_HOLD": Spec(FLAG),
             "IMPLICIT": Spec(FLAG, refused="an implicit equation is not built; solve it for z'"),
         },
         build_differential,
