@@ -121,13 +121,12 @@ def _about_model(model: Model, plugins: tuple[Path, ...] = ()) -> dict[str, Any]
 def _subroutines(model: Model, plugins: tuple[Path, ...]) -> dict[str, Any]:
     """Return user subroutines by element: function, file, and what they ask for under iflag."""
     from mbsim.model.names import element_name, is_adams
-    from mbsim.model.subroutines import wanted
+    from mbsim.model.subroutines import asking, wanted
     from mbsim.plugins.about import about
     from mbsim.plugins.contact_post import CONTACTPOST
     from mbsim.plugins.friction import friction_arguments
     from mbsim.plugins.normal import CNFSUB, normal_arguments
     from mbsim.plugins.source.script import CFFSUB, Scripts
-    from mbsim.plugins.subroutine import ARGUMENTS
 
     scripts: Scripts = {}
     found: dict[str, Any] = {}
@@ -146,10 +145,10 @@ def _subroutines(model: Model, plugins: tuple[Path, ...]) -> dict[str, Any]:
                 contact.cpost, name, "cpost", CONTACTPOST, given, plugins, scripts
             )
     prefix = "ROUTINE" if is_adams(model.file) else "usrsub"
-    for _, statement, id, user, _ in wanted(model):
-        name, par = element_name(model.file, statement, id), list(user.par)
-        given = [id, 0.0, par, len(par), 0, 1]
-        found[name] = about(user, name, prefix, ARGUMENTS, given, plugins, scripts)
+    for each in wanted(model):
+        name, par = element_name(model.file, each.statement, each.id), list(each.user.par)
+        given = [each.id, 0.0, par, len(par), *asking(each)]
+        found[name] = about(each.user, name, prefix, each.call.value, given, plugins, scripts)
     if model.force_elements:
         from mbsim.plugins.residual import about_residual
 

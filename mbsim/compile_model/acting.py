@@ -109,7 +109,7 @@ def acting(
         model.variables,
         model.differentials,
         first_state,
-        tuple(model.sensors),
+        model.shown,
         model.splines,
         model.arrays,
     )
@@ -149,6 +149,6 @@ def acting(
 def check_expressions(model: Model) -> None:
     """Raise what is wrong with expressions where they stand, as `build` would."""
     placement = place(model)
-    users = {(statement, id): None for statement, _, id, _, _ in wanted(model)}
+    users = {(each.kind, each.id): None for each in wanted(model)}
     table = MarkerTable(placement, body_rows(model, placement))
     acting(model, table, 0, users, looks=False, runs=False)

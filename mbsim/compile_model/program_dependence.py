@@ -26,7 +26,8 @@ _MARKERS = {
 def find_depends(scene: Scene) -> Depends:
     """Return moving bodies and states that each program looks at.
 
-    A subroutine may look at anything; its force is taken to depend on the bodies it acts on.
+    A subroutine may look at anything; its force is taken to depend on the bodies it acts on, its
+    slope of a state on all bodies.
     """
     programs, nb = scene.programs, len(scene.bodies.mass)
     row_of = {int(offset): z for z, offset in enumerate(scene.states.offset)}
@@ -52,7 +53,7 @@ def find_depends(scene: Scene) -> Depends:
 
 
 def _bodies_of_forces(scene: Scene) -> dict[int, set[int]]:
-    """Return the bodies that forces act on, by their programs."""
+    """Return the bodies that forces act on, by their programs, and all by those of states."""
     found: dict[int, set[int]] = {}
     applied, body = scene.applied, scene.markers.body
     for f in range(len(applied.form)):
@@ -60,7 +61,8 @@ def _bodies_of_forces(scene: Scene) -> dict[int, set[int]]:
         for program in (applied.program[f], *applied.components[f]):
             if program >= 0:
                 found.setdefault(int(program), set()).update(both)
-    return found
+    everybody = set(range(len(scene.bodies.mass)))
+    return found | {int(program): everybody for program in scene.states.program}
 
 
 def _rows(lists: list[list[int]]) -> tuple[np.ndarray, np.ndarray]:

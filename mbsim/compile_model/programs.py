@@ -58,6 +58,7 @@ _STATEMENTS = {
     "Variable": "Reference_Variable",
     "Differential": "Control_Diff",
     "Sensor": "Sensor_Event",
+    "Evaluation": "Sensor_Evaluate",
     "Request": "Post_Request",
 }
 
@@ -73,7 +74,7 @@ class ProgramTable:
     variables: Mapping[int, Variable] = field(default_factory=dict)
     differentials: Mapping[int, Differential] = field(default_factory=dict)
     first_state: int = 0  # where in y the first of their states stands
-    sensors: Sequence[int] = ()  # ids, row by row
+    sensors: Sequence[int] = ()  # ids by which SENVAL shows what they evaluate, row by row
     splines: Mapping[int, Spline] = field(default_factory=dict)
     arrays_of_numbers: Mapping[int, ArrayOfNumbers] = field(default_factory=dict)
     programs: list[list[Instruction]] = field(default_factory=list)
@@ -82,6 +83,8 @@ class ProgramTable:
     users: Mapping[tuple[str, int], int] = field(default_factory=dict)
     #: What the caller sets between steps; each has the row of `Programs.number` of its place here.
     inputs: Sequence[InputElement] = ()
+    #: Where the rows of elements are that force measures name, once the programs are arrays.
+    element_rows: Rows = field(default_factory=dict)
 
     def add(
         self,
@@ -147,9 +150,20 @@ class ProgramTable:
         return len(self.programs) - 1
 
     def measure(self, node: Call) -> Instruction:
-        """Return the instruction of a displacement or velocity of markers."""
-        allowed = frozenset({Kind.DISPLACEMENT, Kind.VELOCITY})
-        return _Compiler(self, allowed).measure(node, FUNCTIONS[node.name].kind)
+        """Return the instruction of a function that looks at the model."""
+        return _Compiler(self, frozenset()).measure(node, FUNCTIONS[node.name].kind)
+
+    def rows_of(self, instruction: Instruction) -> tuple[int, ...]:
+        """Return the numbers of an instruction, once the programs are arrays.
+
+        Raises
+        ------
+        KeyError
+            If the element that it names is not there.
+        """
+        if instruction.element is None:
+            return instruction.rows
+        return (*self.element_rows[instruction.element], *instruction.rows)
 
     def looks_at(self, program: int) -> list[int]:
         """Return the rows of the markers that displacements of a program are measured between."""
@@ -174,6 +188,7 @@ class ProgramTable:
         rows = {element: (1, k) for k, element in enumerate(applied)}
         rows.update({element: (0, k) for k, element in enumerate(connections)})
         rows.update({("CONTACT", id): (2, k) for k, id in enumerate(contacts)})
+        self.element_rows = rows
         numbers = NumberTable([each.start for each in self.inputs])
         start, code = _table(self.programs, rows, numbers)
         shortened = [quicken(program) for program in self.programs]
@@ -309,7 +324,7 @@ class _Compiler:
         if isinstance(node, Time):
             return [Instruction(TIME)]
         if isinstance(node, UserResult):
-            if Kind.VELOCITY not in self.allowed:
+            if Kind.VELOCITY not in self.allowed and node.statement != "MOTION":
                 raise ExpressionError("what a user subroutine returns cannot be used here", 1)
             row = self.table.users[node.statement, node.id]
             return [Instruction(USER, (row, node.component))]
@@ -400,7 +415,7 @@ class _Compiler:
         id = self.number(node, 0)
         if node.name == "SENVAL":
             if id not in self.table.sensors:
-                raise ExpressionError(f"there is no sensor {id}", node.column)
+                raise ExpressionError(f"no sensor evaluates what SENVAL({id}) shows", node.column)
             return Instruction(SENSED, (list(self.table.sensors).index(id),))
         if id not in self.table.differentials:
             raise ExpressionError(f"there is no state {id}", node.column)

@@ -338,7 +338,7 @@ def _asks_time(system: System) -> bool:
     """Return whether a user's function may look at the time."""
     from mbsim.plugins.source.diagnose import reads_parameter
 
-    if any(name[0] != STATEMENT for name in system.subroutines):
+    if any(name[0] != STATEMENT and user.acts for name, user in system.subroutines.items()):
         return True
     for _, user in system.user_laws:
         source = user.source

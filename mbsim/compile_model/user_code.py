@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbsim.arrays.model import Residuals, Users
-from mbsim.forces.catalog import Components, Expressed, of_form
 from mbsim.model.elements import Model
+from mbsim.model.subroutines import wanted
 
 if TYPE_CHECKING:
     from mbsim.plugins import UserFriction
@@ -30,7 +30,7 @@ class UserCode:
     friction: dict[int, UserFriction]  # by contact id
     normal: dict[int, UserNormal]  # by contact id
     posts: list[ContactPost]
-    subroutines: dict[tuple[str, int], UserSubroutine]  # of forces and variables, row by row
+    subroutines: dict[tuple[str, int], UserSubroutine]  # in place of expressions, row by row
     residuals: dict[int, UserResidual]  # by Force_Element
 
     @property
@@ -53,8 +53,8 @@ def _load_user_friction(
     scripts: dict[Path, Script],
 ) -> dict[int, UserFriction]:
     """Load the users' CFFSUBs; scenes without one do not import what that needs."""
-    wanted = [c for c in model.contacts.values() if c.asks_user]
-    if not wanted:
+    asked = [c for c in model.contacts.values() if c.asks_user]
+    if not asked:
         return {}
     from mbsim.plugins import failure, host, load_friction
     from mbsim.plugins.subroutine import end_run
@@ -64,7 +64,7 @@ def _load_user_friction(
     host.forget()
     if log is not None:
         host.log = log
-    return {c.id: load_friction(c, plugins, interpret, scripts, log) for c in wanted}
+    return {c.id: load_friction(c, plugins, interpret, scripts, log) for c in asked}
 
 
 def _load_user_normal(
@@ -75,8 +75,8 @@ def _load_user_normal(
     scripts: dict[Path, Script],
 ) -> dict[int, UserNormal]:
     """Load the users' CNFSUBs."""
-    wanted = [c for c in model.contacts.values() if c.cnf_type == "USERCNF"]
-    if not wanted:
+    asked = [c for c in model.contacts.values() if c.cnf_type == "USERCNF"]
+    if not asked:
         return {}
     from mbsim.plugins.normal import load_normal
     from mbsim.plugins.subroutine import begin_run, end_run
@@ -84,7 +84,7 @@ def _load_user_normal(
     if all(c.cff_type != "USERCFF" for c in model.contacts.values()):
         end_run()
     begin_run(log)
-    return {c.id: load_normal(c, plugins, interpret, scripts, log) for c in wanted}
+    return {c.id: load_normal(c, plugins, interpret, scripts, log) for c in asked}
 
 
 def _load_posts(
@@ -94,14 +94,14 @@ def _load_posts(
     scripts: dict[Path, Script],
 ) -> list[ContactPost]:
     """Load the users' CONTACTPOSTs."""
-    wanted = [c for c in model.contacts.values() if c.cpost is not None]
-    if not wanted:
+    asked = [c for c in model.contacts.values() if c.cpost is not None]
+    if not asked:
         return []
     from mbsim.plugins.contact_post import load_post
     from mbsim.plugins.subroutine import begin_run
 
     begin_run(log)
-    return [load_post(c, plugins, scripts) for c in wanted]
+    return [load_post(c, plugins, scripts) for c in asked]
 
 
 def _load_subroutines(
@@ -110,12 +110,8 @@ def _load_subroutines(
     log: Callable[[str], None] | None,
     scripts: dict[Path, Script],
 ) -> dict[tuple[str, int], UserSubroutine]:
-    """Load the users' subroutines of forces and variables."""
-    elements = (
-        *model.variables.values(),
-        *(e for kind in of_form(Expressed, Components) for e in model.table(kind.name).values()),
-    )
-    if all(element.user is None for element in elements):
+    """Load the users' subroutines that stand in place of expressions."""
+    if not wanted(model):
         return {}
     from mbsim.compile_model.subroutines import load
     from mbsim.plugins.subroutine import begin_run

@@ -305,5 +305,5 @@ _put(
     "SENSOR",
     None,
     "id",
-    SENVAL="what a Sensor_Event evaluated when it acted last, 0 before",
+    SENVAL="what a Sensor_Evaluate, or else the sensor, evaluated when it acted last, 0 before",
 )

@@ -161,7 +161,7 @@ class _Builder:
         parts = given[1::2]
         if name == "CONTACT" and len(parts) == FUNCTIONS[CONTACT_BY_INDEX].least:
             name = CONTACT_BY_INDEX
-        _check_arguments(FUNCTIONS[name], [part.node for part in parts], column)
+        check_arguments(FUNCTIONS[name], [part.node for part in parts], column)
         made = _call(name, parts, column)
         return _nested(made, made, column)
 
@@ -244,7 +244,7 @@ def _like(name: str) -> str:
     return f"; did you mean {near[0]}?" if near else ""
 
 
-def _check_arguments(function: Function, args: list[Node], column: int) -> None:
+def check_arguments(function: Function, args: list[Node], column: int) -> None:
     """Refuse a wrong number of arguments, and ids and flags that are none."""
     name, least, most = function.name, function.least, len(function.args)
     if not least <= len(args) <= most:

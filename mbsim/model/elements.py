@@ -40,6 +40,7 @@ __all__ = [
     "Contact",
     "Coupler",
     "Differential",
+    "Evaluation",
     "ForceElement",
     "GeneralConstraint",
     "Graphic",
@@ -276,6 +277,7 @@ class Motion:
     expr: Expression | None = None  # of TIME; [L], [rad] or their rates
     ic_disp: float | None = None  # what a V or A motion starts from; None: as the bodies stand
     ic_vel: float | None = None
+    user: Subroutine | None = None  # `expr` is then what it returns
     source: Source = Source()
 
     @property
@@ -319,6 +321,7 @@ class Differential:
     ic: float = 0.0
     scale: float = 1.0
     is_static_hold: bool = False
+    user: Subroutine | None = None  # `expr` is then what it returns
     label: str = ""
     source: Source = Source()
 
@@ -355,7 +358,8 @@ class Sensor:
 
     `zero_crossing`: a step ends where it becomes true. What it does: `halt` ends the run,
     `stops` (return) the Simulate, `prints` adds a row; `dt` [T] is the print interval, `stepsize`
-    the next step, `h_max` the longest from then on; `evaluate` is what SENVAL(id) shows.
+    the next step, `h_max` the longest from then on; `evaluate` is what SENVAL shows, by the id of
+    the Sensor_Evaluate `evaluate_id` that it is of, or by the sensor's own.
     """
 
     id: int
@@ -365,6 +369,7 @@ class Sensor:
     error_tol: float = 0.0
     zero_crossing: bool = False
     evaluate: Expression | None = None
+    evaluate_id: int | None = None
     halt: bool = False
     stops: bool = False
     prints: bool = False
@@ -372,6 +377,18 @@ class Sensor:
     stepsize: float | None = None
     h_max: float | None = None
     verbose: bool = False
+    user: Subroutine | None = None  # `expr` is then what it returns
+    label: str = ""
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Sensor_Evaluate: what SENVAL(id) shows from when a sensor that names it acts."""
+
+    id: int
+    expr: Expression
+    user: Subroutine | None = None  # `expr` is then what it returns
     label: str = ""
     source: Source = Source()
 
@@ -396,6 +413,7 @@ class Request:
     elem_id: int = 0
     jflag: bool = False  # the force on J's side instead of I's
     exprs: tuple[Expression | None, ...] = ()
+    user: Subroutine | None = None  # of EXPRESSION: `exprs` are then what it returns
     source: Source = Source()
 
 
@@ -428,6 +446,7 @@ class Model:
     splines: dict[int, Spline] = field(default_factory=dict)
     arrays: dict[int, ArrayOfNumbers] = field(default_factory=dict)
     sensors: dict[int, Sensor] = field(default_factory=dict)
+    evaluations: dict[int, Evaluation] = field(default_factory=dict)
     gravity: Gravity = field(default_factory=Gravity)
     transient: Transient = field(default_factory=Transient)
     simulations: tuple[Simulation, ...] = ()
@@ -441,6 +460,13 @@ class Model:
 
     # elements whose value the caller sets while the model runs, see `run.inputs`
     inputs: tuple[InputElement, ...] = ()
+
+    @property
+    def shown(self) -> tuple[int, ...]:
+        """By which id SENVAL shows what each sensor evaluates, 0 for none."""
+        if not self.evaluations:
+            return tuple(self.sensors)
+        return tuple(sensor.evaluate_id or 0 for sensor in self.sensors.values())
 
     def table(self, name: str) -> Mapping[int, Any]:
         """Return the elements of a field by id, or those of a kind of `forces.catalog`."""

@@ -57,6 +57,7 @@ def tables(model: Model) -> dict[str, Mapping[int, Any]]:
         "Reference_Spline": model.splines,
         "Reference_Array": model.arrays,
         "Sensor_Event": model.sensors,
+        "Sensor_Evaluate": model.evaluations,
     }
 
 
@@ -84,8 +85,13 @@ def wanted(model: Model) -> Iterator[Wanted]:
             statement = STATEMENTS[request.elem_type]
             name = f"Post_Request[{request.id}]"
             yield request.source, name, "elem_id", request.elem_id, statement
+    for sensor in model.sensors.values():
+        name = f"Sensor_Event[{sensor.id}]"
+        yield sensor.source, name, "evaluate_id", sensor.evaluate_id, "Sensor_Evaluate"
     for source, name, attribute, expression in expressions(model):
         for id, statement in _used(expression):
+            if statement == "Sensor_Event" and model.evaluations:
+                statement = "Sensor_Evaluate"
             yield source, name, attribute, id, statement
 
 
@@ -102,7 +108,7 @@ def expressions(model: Model) -> Iterator[tuple[Source, str, str, Expression]]:
                 if expression is not None:
                     yield force.source, f"{kind.statement}[{force.id}]", attribute, expression
     for sensor in model.sensors.values():
-        if sensor.evaluate is not None:
+        if sensor.evaluate is not None and sensor.evaluate_id is None:
             yield sensor.source, f"Sensor_Event[{sensor.id}]", "evaluate", sensor.evaluate
     for request in model.requests.values():
         for k, expression in enumerate(request.exprs, start=1):

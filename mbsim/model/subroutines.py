@@ -1,25 +1,100 @@
-"""User subroutines of forces and variables, in order of their rows."""
+"""User subroutines of forces, variables, states, sensors, motions and requests, in their order."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from enum import Enum
+from typing import Any, NamedTuple
 
 from mbsim.forces.catalog import Components, Expressed, of_form
 from mbsim.model.elements import Model
 from mbsim.model.source import Subroutine
 
 
-def wanted(model: Model) -> list[tuple[str, str, int, Subroutine, int]]:
-    """Return statement, XML statement, id, subroutine and number of results of all users'."""
-    found = []
+class Call(Enum):
+    """How a subroutine is called: the names of its arguments."""
+
+    FORCE = "id, time, par, npar, dflag, iflag"
+    PLAIN = "id, time, par, npar, iflag"
+    MOTION = "id, time, par, npar, iord, iflag"
+
+
+#: Numbers that a REQSUB returns.
+RESULTS = 8
+#: What MOTSUB is asked for by `val_type`: displacement, velocity, acceleration are 0, 1, 2.
+ORDERS = {"D": (0, 1, 2), "V": (1, 2), "A": (2,)}
+
+
+class Wanted(NamedTuple):
+    """A subroutine of an element.
+
+    Attributes
+    ----------
+    kind : str
+        Of `forces.catalog`, or VARIABLE, DIFF, SENSOR, SENVAL (what a sensor evaluates), MOTION,
+        REQUEST: with the id what `expressions.tree.UserResult` names.
+    statement : str
+        The XML's name of the statement.
+    id : int
+    user : Subroutine
+    results : int
+        How many numbers it gives: of a motion value, rate and second rate.
+    call : Call
+    orders : tuple of int
+        Of a motion: iord of the calls for these.
+    """
+
+    kind: str
+    statement: str
+    id: int
+    user: Subroutine
+    results: int = 1
+    call: Call = Call.FORCE
+    orders: tuple[int, ...] = ()
+
+
+def asking(each: Wanted) -> tuple[int, ...]:
+    """Return what stands behind id, time, par, npar in the one call with iflag 1."""
+    return {Call.FORCE: (0, 1), Call.PLAIN: (1,), Call.MOTION: (*each.orders[:1], 1)}[each.call]
+
+
+def calls(each: Wanted) -> tuple[tuple[int, ...], ...]:
+    """Return what stands behind id, time, par, npar in the calls for numbers."""
+    if each.call is Call.MOTION:
+        return tuple((iord, 0) for iord in each.orders)
+    return ((0, 0),) if each.call is Call.FORCE else ((0,),)
+
+
+def wanted(model: Model) -> list[Wanted]:
+    """Return all user subroutines that stand in place of expressions."""
+    return list(_wanted(model))
+
+
+def _wanted(model: Model) -> Iterator[Wanted]:
+    """Yield them: forces, variables, then what came later."""
     for kind in of_form(Expressed):
-        for force in model.table(kind.name).values():
-            if force.user is not None:
-                found.append((kind.name, kind.statement, force.id, force.user, 1))
-    for variable in model.variables.values():
-        if variable.user is not None:
-            found.append(("VARIABLE", "Reference_Variable", variable.id, variable.user, 1))
+        for force in _with_users(model.table(kind.name)):
+            yield Wanted(kind.name, kind.statement, force.id, force.user)
+    for variable in _with_users(model.variables):
+        yield Wanted("VARIABLE", "Reference_Variable", variable.id, variable.user)
     for kind in of_form(Components):
-        for vector in model.table(kind.name).values():
-            if vector.user is not None:
-                count = sum(expr is not None for expr in vector.exprs)
-                found.append((kind.name, kind.statement, vector.id, vector.user, count))
-    return found
+        for vector in _with_users(model.table(kind.name)):
+            results = sum(expr is not None for expr in vector.exprs)
+            yield Wanted(kind.name, kind.statement, vector.id, vector.user, results)
+    for state in _with_users(model.differentials):
+        yield Wanted("DIFF", "Control_Diff", state.id, state.user)
+    for motion in _with_users(model.motions):
+        orders = ORDERS[motion.val_type]
+        yield Wanted("MOTION", motion.statement, motion.id, motion.user, 3, Call.MOTION, orders)
+    for name, statement, table, results in (
+        ("SENSOR", "Sensor_Event", model.sensors, 1),
+        ("SENVAL", "Sensor_Evaluate", model.evaluations, 1),
+        ("REQUEST", "Post_Request", model.requests, RESULTS),
+    ):
+        for element in _with_users(table):
+            yield Wanted(name, statement, element.id, element.user, results, Call.PLAIN)
+
+
+def _with_users(table: Mapping[int, Any]) -> list[Any]:
+    """Return the elements that a subroutine gives."""
+    return [element for element in table.values() if element.user is not None]

@@ -17,6 +17,7 @@ from mbsim.plugins.helpers import StopRun, host
 from mbsim.plugins.source.octave import OctaveError
 
 if TYPE_CHECKING:
+    from mbsim.model.subroutines import Wanted
     from mbsim.plugins.types import UserFriction
 from mbsim.plugins.permission import watched
 from mbsim.plugins.returned import NotAForce, force_and_state, numbers, one_number, three_numbers
@@ -210,25 +211,20 @@ def callback(
 
 
 def state_callback(
-    function: Callable[..., Any],
-    element: tuple[str, int],
-    place: tuple[str, str],
-    par: Sequence[float],
-    count: int,
+    function: Callable[..., Any], title: str, place: tuple[str, str], each: Wanted
 ) -> tuple[int, object]:
     """Return the address of a subroutine that may look at the trial state, and its keeper.
 
     Parameters
     ----------
     function : callable
-        Of (id, time, par, npar, dflag, iflag); it returns a number, or `count` of them.
-    element : (str, int)
-        How messages name it, and its id.
+    title : str
+        How messages name its element.
     place : (str, str)
         Name of the function, and its file.
-    par : sequence of float
-    count : int
-        How many numbers it returns.
+    each : Wanted
+        How it is called, and how many numbers it gives. A motion's gives one a call, and is not
+        given a state to look at: it is of the time alone.
 
     Returns
     -------
@@ -239,24 +235,32 @@ def state_callback(
         What must live as long as the address is used.
     """
     from mbsim.core.codes import Code
+    from mbsim.model.subroutines import Call, asking, calls
 
+    count, id = each.results, each.id
     results_at = Views(count)
-    title, id = element
     name, source = place
     function = watched(function, f"{title}: {name} ({source})")
-    values, npar = [float(value) for value in par], len(par)
+    values, npar = [float(value) for value in each.user.par], len(each.user.par)
+    first, (flags, *others) = asking(each), calls(each)
+    moves, at_rows = each.call is Call.MOTION, each.kind == "REQUEST"
     started = False
 
     def guarded(scene: int, time: float, y: int, results: int) -> int:
         nonlocal started
-        outer, host.time = host.state, time
-        host.state = (scene, time, y)
+        outer, outer_row, host.time = host.state, host.at_row, time
+        host.state, host.at_row = None if moves else (scene, time, y), at_rows
         try:
             if not started:
                 started = True
-                function(id, time, values.copy(), npar, 0, 1)
-            result = function(id, time, values.copy(), npar, 0, 0)
-            if count == 1:
+                function(id, time, values.copy(), npar, *first)
+            result = function(id, time, values.copy(), npar, *flags)
+            if moves:
+                room = results_at[results]
+                room[0] = one_number(result)[0]
+                for k, more in enumerate(others, 1):
+                    room[k] = one_number(function(id, time, values.copy(), npar, *more))[0]
+            elif count == 1:
                 if type(result) is not float or result - result != 0.0:
                     result = one_number(result)[0]
                 results_at[results][0] = result
@@ -271,7 +275,7 @@ def state_callback(
             failure.store(error, title, time, name, source)
             return code_of(error)
         finally:
-            host.state = outer
+            host.state, host.at_row = outer, outer_row
 
     entry = STATE_FUNCTION(guarded)
     return int(ctypes.cast(entry, ctypes.c_void_p).value or 0), entry

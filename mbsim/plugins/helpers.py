@@ -56,6 +56,8 @@ class Host:
         self.log: Callable[[str], None] = _to_stderr
         #: While a subroutine that may look at it runs: scene, time, and where y lies.
         self.state: tuple[int, float, int] | None = None
+        #: While one of a request runs: forces and accelerations are known too.
+        self.at_row = False
         #: Scene and y of friction subroutines that may look, where there are some.
         self.seen: tuple[int, int] | None = None
         #: What looks at it: (name, ids) -> [value, errflg] and -> [values, errflg].
@@ -119,7 +121,7 @@ def py_sysfnc(name: str, ids: Sequence[float]) -> list[Any]:
     """Return [value, errflg] of a function of the language, DX for example, at the trial state.
 
     errflg is 1 and the value 0 where the function or a marker is not known, forces and
-    accelerations among them, and outside subroutines.
+    accelerations among them except in a REQSUB, and outside subroutines.
     """
     if host.asked is not None:
         host.asked.append(_question(name, ids))
@@ -131,10 +133,14 @@ def py_sysfnc(name: str, ids: Sequence[float]) -> list[Any]:
 
 
 def py_sysary(name: str, ids: Sequence[float]) -> list[Any]:
-    """Return [values, errflg] of DISP, TDISP, RDISP, VEL, TVEL or RVEL at the trial state."""
+    """Return [values, errflg] of DISP, TDISP, RDISP, VEL, TVEL or RVEL at the trial state.
+
+    In a REQSUB also of ACC, TACC, RACC, FORCE, TFORCE and RFORCE.
+    """
     if host.asked is not None:
         host.asked.append(_question(name, ids))
-        return [[0.0] * (6 if str(name).strip().upper() in ("DISP", "VEL") else 3), 0]
+        whole = str(name).strip().upper() in ("DISP", "VEL", "ACC", "FORCE")
+        return [[0.0] * (6 if whole else 3), 0]
     if host.state is None:
         _no_state("py_sysary")
         return [[], 1]

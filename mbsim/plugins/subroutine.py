@@ -1,6 +1,6 @@
-"""User subroutines of forces and variables: SFOSUB, GFOSUB, VARSUB and their like.
+"""User subroutines in place of expressions: SFOSUB, GFOSUB, VARSUB, DIFSUB, MOTSUB and their like.
 
-All are called as (id, time, par, npar, dflag, iflag) and return a number or a list of them.
+They are called as `model.subroutines.Call` says and return a number or a list of them.
 They stay interpreted: what they ask by `py_sysfnc` is looked up in Python.
 """
 
@@ -9,16 +9,19 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-from mbsim.model.elements import Subroutine
+import numpy as np
+import numpy.typing as npt
+
+from mbsim.errors import PluginError
 from mbsim.model.names import element_name, is_adams
+from mbsim.model.subroutines import Call, Wanted
 from mbsim.plugins import guard
 from mbsim.plugins.helpers import host
 from mbsim.plugins.source.find import find_script
 from mbsim.plugins.source.octave import end_all
 from mbsim.plugins.source.script import Scripts, user_function
-
-ARGUMENTS = "id, time, par, npar, dflag, iflag"
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +41,9 @@ class UserSubroutine:
     element : (str, int)
         Statement and id of the element that names it.
     looks : bool
-        Whether its script may ask for functions of the language by `py_sysfnc`.
+        Whether it may ask for functions of the language by `py_sysfnc`.
+    acts : bool
+        Whether motion may follow from what it gives.
     """
 
     address: int
@@ -47,33 +52,81 @@ class UserSubroutine:
     name: str
     element: tuple[str, int]
     looks: bool
-    keep: object = field(default=None, repr=False)
+    acts: bool = True
+    keep: Any = field(default=None, repr=False)
+
+    def called(self, time: float, results: npt.NDArray[np.float64]) -> int:
+        """Write what one that looks at no state gives at a time; return 0 or a code."""
+        return int(self.keep(0, time, 0, results.ctypes.data))
 
 
 def load_subroutine(
-    user: Subroutine,
-    element: tuple[str, int],
-    count: int,
-    plugin_files: Sequence[Path],
-    scripts: Scripts,
-    deck: str = "",
+    each: Wanted, plugin_files: Sequence[Path], scripts: Scripts, deck: str = ""
 ) -> UserSubroutine:
-    """Return the subroutine of an element (its statement and id) that gives `count` numbers.
-
-    Messages name the element as the file `deck` does.
+    """Return the subroutine of an element; messages name the element as the file `deck` does.
 
     Raises
     ------
     ModelError
         If the file or the function cannot be used; the message says what to change.
     """
-    title = element_name(deck, *element)
+    user, title = each.user, element_name(deck, each.statement, each.id)
     prefix = "ROUTINE" if is_adams(deck) else "usrsub"
     script = find_script(user, user.fnc_name, title, prefix, plugin_files, scripts)
-    function = user_function(script, user.fnc_name, title, ARGUMENTS)
+    function = user_function(script, user.fnc_name, title, each.call.value)
     place = user.fnc_name, str(script.path)
-    address, keep = guard.state_callback(function, (title, element[1]), place, user.par, count)
-    return UserSubroutine(address, count, script.path, user.fnc_name, element, script.looks, keep)
+    address, keep = guard.state_callback(function, title, place, each)
+    looks = script.looks and each.call is not Call.MOTION
+    return UserSubroutine(
+        address,
+        each.results,
+        script.path,
+        user.fnc_name,
+        (each.statement, each.id),
+        looks,
+        each.kind != "REQUEST",
+        keep,
+    )
+
+
+#: Times at which the rates of a motion are tried, how far off the differences for that are taken,
+#: in parts of the run, and by how much both may differ.
+_TRIED, _APART, _ALIKE = 9, 1e-7, 0.1
+
+
+def check_rates(user: UserSubroutine, each: Wanted, begin: float, end: float, deck: str) -> None:
+    """Refuse a MOTSUB whose rates are not those of what it gives: bodies would drift from it.
+
+    What it raises meanwhile is left to the run.
+
+    Raises
+    ------
+    PluginError
+        If that is so at more than half of the times that are tried.
+    """
+    found = np.zeros((3, 3))
+    wrong: list[tuple[float, int, float, float]] = []
+    for t in np.linspace(begin, end, _TRIED + 2)[1:-1]:
+        h = _APART * (end - begin)
+        if any(user.called(at, row) for at, row in zip((t - h, t, t + h), found, strict=True)):
+            guard.failure.clear()
+            return
+        for order in range(1, len(each.orders)):
+            rate, seen = found[1, order], (found[2, order - 1] - found[0, order - 1]) / (2.0 * h)
+            noise = 1e-15 * np.abs(found[:, order - 1]).max() / h
+            if abs(rate - seen) > _ALIKE * max(abs(rate), abs(seen)) + noise:
+                wrong.append((float(t), order, float(rate), float(seen)))
+    for order in range(1, len(each.orders)):
+        of_order = [one for one in wrong if one[1] == order]
+        if 2 * len(of_order) > _TRIED:
+            t, _, rate, seen = of_order[0]
+            before, iord = each.orders[order - 1], each.orders[order]
+            raise PluginError(
+                f"{element_name(deck, each.statement, each.id)}: {user.name} ({user.source}) gives "
+                f"{rate:.6g} with iord {iord} at time {t:.6g}, but what it gives with iord "
+                f"{before} changes by {seen:.6g} a unit of time there: one must be the rate of the "
+                "other"
+            )
 
 
 def begin_run(log: Callable[[str], None] | None) -> None:

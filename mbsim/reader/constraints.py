@@ -24,20 +24,17 @@ from mbsim.reader.kinds import (
     POSITIVE,
     REAL,
     REALS,
+    TEXT,
     WORDS,
     keyword,
 )
 from mbsim.reader.statement import MARKERS, NAMED, Entry, Spec, Statement
+from mbsim.reader.subroutine import GIVEN_BY, USERSUB, expression_or_user
 
 _NOT_BUILT = "is documented but not built yet"
 #: What only some joints have; DISTANCE may have a length, the others must have theirs.
 _OF_SOME_JOINTS = {"pitch": "SCREW", "pitch_diameter": "RACK_PINION", "length": "DISTANCE"}
-#: Attributes of a user subroutine, which stand in place of an expression.
-USERSUB = ("usrsub_param_string", "usrsub_fnc_name", "usrsub_dll_name")
-USERSUB_REFUSED = {
-    name: Spec(refused=f"{_NOT_BUILT}; give expr")
-    for name in (*USERSUB, "script_name", "interpreter")
-}
+USERSUB_REFUSED = {name: Spec(refused=f"{_NOT_BUILT}; give expr") for name in USERSUB}
 
 #: What says that an element is given by an expression; the other way is not built.
 BY_WHAT = Spec(keyword(BY_EXPRESSION, BY_USERSUB), "how it is given", "", "EXPRESSION")
@@ -144,6 +141,7 @@ def _build_motion(entry: Entry) -> None:
     if val_type is None:
         return
     note_unused_starts(entry, val_type, "ic_disp", "ic_vel")
+    expr, user = expression_or_user(entry, "MOTION", "MOTSUB")
     motion = el.Motion(
         id=entry.get("id", 0),
         label=entry.get("label", ""),
@@ -152,14 +150,12 @@ def _build_motion(entry: Entry) -> None:
         j_marker_id=entry.get("j_marker_id", 0),
         direction=entry.get("motion_type" if of_joint else "direction", ""),
         val_type=val_type,
-        expr=entry.get("expr"),
+        expr=expr,
+        user=user,
         ic_disp=entry.get("ic_disp") if val_type != "D" else None,
         ic_vel=entry.get("ic_vel") if val_type == "A" else None,
         source=entry.source,
     )
-    by_expression = entry.get("type") is not None or not entry.given("type")
-    if by_expression and not entry.given("expr"):
-        entry.fault(f"expr: missing; must be {EXPRESSION.allowed} of TIME")
     other = entry.draft.motions.get(motion.id)
     if other is not None and other.statement != motion.statement:
         first = f"{other.statement} on line {other.source.line}"
@@ -233,11 +229,11 @@ CONSTRAINT_GENERAL = Statement(
 )
 _GIVEN_MOTION: dict[str, Spec] = {
     "val_type": Spec(keyword(VALUE_TYPES), "what expr gives, see below", required=True),
-    "type": BY_WHAT,
-    "expr": Spec(EXPRESSION, "displacement, velocity or acceleration over TIME; needed"),
+    "type": GIVEN_BY,
+    "expr": Spec(EXPRESSION, "displacement, velocity or acceleration over TIME"),
     "ic_disp": Spec(REAL, "displacement at the start, with V and A", "L or rad", "as assembled"),
     "ic_vel": Spec(REAL, "velocity at the start, with A", "L/T or rad/T", "as bodies move"),
-    **USERSUB_REFUSED,
+    **USERSUB,
 }
 MOTION_JOINT = Statement(
     "Motion_Joint",
@@ -245,6 +241,7 @@ MOTION_JOINT = Statement(
         **NAMED,
         "joint_id": Spec(ID, "joint that is driven", required=True),
         "motion_type": Spec(keyword(DIRECTIONS), "R turns, T slides", "", "the joint's"),
+        "joint_type": Spec(TEXT, note="the joint's own type counts"),
         **_GIVEN_MOTION,
     },
     _build_motion,

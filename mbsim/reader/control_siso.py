@@ -52,7 +52,9 @@ CONTROL_SISO = Statement(
         "x_array_id": Spec(ID, "array of type X: its states"),
         "y_array_id": Spec(ID, "array of type Y: its output", required=True),
         "u_array_id": Spec(ID, "array of type U: its input", required=True),
-        "is_static_hold": Spec(FLAG, "TRUE: a static analysis leaves its states as they are", "", "FALSE"),
+        "is_static_hold": Spec(
+            FLAG, "TRUE: a static analysis leaves its states as they are", "", "FALSE"
+        ),
         "num_numerator_coef": Spec(COUNT, "how many there are", "", "as many as are given"),
         "numerator_coef": Spec(REALS, "of s^0, s^1 and so on", required=True),
         "num_denominator_coef": Spec(COUNT, "how many there are", "", "as many as are given"),

@@ -40,6 +40,7 @@ class Draft:
     force_elements: dict[int, el.ForceElement] = field(default_factory=dict)
     variables: dict[int, el.Variable] = field(default_factory=dict)
     sensors: dict[int, el.Sensor] = field(default_factory=dict)
+    evaluations: dict[int, el.Evaluation] = field(default_factory=dict)
     differentials: dict[int, el.Differential] = field(default_factory=dict)
     splines: dict[int, el.Spline] = field(default_factory=dict)
     arrays: dict[int, el.ArrayOfNumbers] = field(default_factory=dict)

@@ -60,7 +60,6 @@ FACETS = spellings(FLAT="", SMOOTH="")
 ENDS_TYPES = spellings(OPEN="", CLOSED="", TOP_ONLY="", BOTTOM_ONLY="")
 
 REQUEST_TYPES = spellings(**{name: type.spellings for name, type in TYPES.items()})
-REQUEST_NOT_BUILT = spellings(USERSUB="")
 #: What a request may ask the force of: Adams' statement, with MotionSolve's names for it.
 FORCE_ELEMENTS = spellings(
     JOINT="CONSTRAINT_JOINT",

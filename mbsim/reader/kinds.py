@@ -161,8 +161,8 @@ def _parse_tree(text: str) -> Expression:
 
     if re.match(r"USER\s*\(", text, re.IGNORECASE):
         raise BadValueError(
-            "USER(...) is no expression; only forces and variables take subroutines (in XML decks "
-            "by usrsub_param_string and usrsub_fnc_name)"
+            "USER(...) is no expression; a subroutine stands in place of one where the manual has "
+            "it (in XML decks by usrsub_param_string and usrsub_fnc_name)"
         )
     try:
         return parse(text)

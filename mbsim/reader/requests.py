@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
+from mbsim.expressions.tree import Expression
 from mbsim.model import elements as el
-from mbsim.reader.keywords import FORCE_ELEMENTS, REQUEST_NOT_BUILT, REQUEST_TYPES
+from mbsim.model.subroutines import RESULTS
+from mbsim.reader.keywords import BY_USERSUB, FORCE_ELEMENTS, REQUEST_TYPES
 from mbsim.reader.kinds import EXPRESSION, FLAG, ID, TEXT, keyword
 from mbsim.reader.statement import NAMED, Entry, Spec, Statement
+from mbsim.reader.subroutine import USERSUB, result, subroutine
 
 _EXPRESSIONS = tuple(f"expr{k}" for k in range(1, 9))
 _MARKERS = ("i_marker_id", "j_marker_id", "ref_marker_id")
-_USERSUB = (
-    "usrsub_param_string",
-    "usrsub_fnc_name",
-    "usrsub_dll_name",
-    "script_name",
-    "interpreter",
-)
 #: What each type takes; the first ones it must have.
 _TAKES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "ELEMENTAL_FORCE": (("elem_type", "elem_id"), ("jflag", "ref_marker_id")),
     "EXPRESSION": ((), _EXPRESSIONS),
+    "USERSUB": (("usrsub_param_string",), tuple(USERSUB)[1:]),
 }
 _OF_MARKERS = (("i_marker_id",), ("j_marker_id", "ref_marker_id"))
+
+
+def user_results(entry: Entry, user: el.Subroutine) -> tuple[Expression, ...]:
+    """Return F1..F8 of a request that a subroutine gives."""
+    trees = (result(entry, "REQUEST", user, k).root for k in range(RESULTS))
+    return tuple(Expression(f"{user.fnc_name} {k}", tree) for k, tree in enumerate(trees, 1))
 
 
 def _build_request(entry: Entry) -> None:
@@ -30,7 +33,7 @@ def _build_request(entry: Entry) -> None:
     if type is None:
         return
     needs, may = _TAKES.get(type, _OF_MARKERS)
-    every = (*_MARKERS, "elem_type", "elem_id", "jflag", *_EXPRESSIONS, *_USERSUB)
+    every = (*_MARKERS, "elem_type", "elem_id", "jflag", *_EXPRESSIONS, *USERSUB)
     for name in every:
         if entry.given(name) and name not in (*needs, *may):
             entry.fault(f"belongs to another type of request than {type}", name)
@@ -41,9 +44,12 @@ def _build_request(entry: Entry) -> None:
     exprs = tuple(entry.get(name) for name in _EXPRESSIONS)
     if type == "EXPRESSION" and not any(entry.given(name) for name in _EXPRESSIONS):
         entry.fault("expr1 ... expr8: missing; at least one must be given")
+    user = subroutine(entry, "usrsub", "REQSUB") if type == "USERSUB" else None
+    if user is not None:
+        exprs = user_results(entry, user)
     request = el.Request(
         id=entry.get("id", 0),
-        type=type,
+        type="EXPRESSION" if user is not None else type,
         label=entry.get("label", ""),
         comment=entry.get("comment", ""),
         i_marker_id=entry.get("i_marker_id", 0),
@@ -52,7 +58,8 @@ def _build_request(entry: Entry) -> None:
         elem_type=entry.get("elem_type", ""),
         elem_id=entry.get("elem_id", 0),
         jflag=entry.get("jflag", False),
-        exprs=exprs if type == "EXPRESSION" else (),
+        exprs=exprs if type in ("EXPRESSION", "USERSUB") else (),
+        user=user,
         source=entry.source,
     )
     entry.register(entry.draft.requests, request)
@@ -62,7 +69,7 @@ POST_REQUEST = Statement(
     "Post_Request",
     {
         "id": NAMED["id"],
-        "type": Spec(keyword(REQUEST_TYPES, REQUEST_NOT_BUILT), "what is written", required=True),
+        "type": Spec(keyword(REQUEST_TYPES | BY_USERSUB), "what is written", required=True),
         "label": NAMED["label"],
         "comment": Spec(TEXT, "name in the CSV file, where there is no label"),
         "i_marker_id": Spec(ID, "marker I"),
@@ -72,7 +79,7 @@ POST_REQUEST = Statement(
         "elem_id": Spec(ID, "its id"),
         "jflag": Spec(FLAG, "TRUE: what acts on J", "", "FALSE"),
         **{name: Spec(EXPRESSION, f"F{name[-1]} of EXPRESSION", "", "0") for name in _EXPRESSIONS},
-        **{name: Spec(TEXT, "of type USERSUB, which is not built") for name in _USERSUB},
+        **USERSUB,
     },
     _build_request,
     about="numbers for the result file: motion, forces, expressions",

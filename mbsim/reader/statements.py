@@ -16,7 +16,7 @@ from mbsim.reader.constraints import (
 from mbsim.reader.contact import FORCE_CONTACT
 from mbsim.reader.control_siso import CONTROL_SISO
 from mbsim.reader.control_state_eqn import CONTROL_STATE_EQN
-from mbsim.reader.controls import CONTROL_DIFF, SENSOR_EVENT
+from mbsim.reader.controls import CONTROL_DIFF, SENSOR_EVALUATE, SENSOR_EVENT
 from mbsim.reader.draft import Draft
 from mbsim.reader.forces import force_statements
 from mbsim.reader.graphics import POST_GRAPHIC
@@ -57,6 +57,7 @@ STATEMENTS = (
     REFERENCE_ARRAY,
     REFERENCE_MATRIX,
     SENSOR_EVENT,
+    SENSOR_EVALUATE,
     POST_REQUEST,
     SIMULATE,
     STOP,

@@ -20,6 +20,8 @@ USERSUB = {
     "interpreter": Spec(TEXT, "its language", "", "PYTHON"),
 }
 BY_EITHER = keyword({**BY_EXPRESSION, **BY_USERSUB})
+#: How an element says which of both gives it.
+GIVEN_BY = Spec(BY_EITHER, "how it is given", "", "by what is given")
 
 
 def subroutine(entry: Entry, prefix: str, default: str) -> el.Subroutine:
@@ -75,6 +77,25 @@ def _library(entry: Entry, prefix: str) -> str:
         entry.fault("no such file (the path is relative to the deck)", name)
         return ""
     return os.path.realpath(found)
+
+
+def expression_or_user(
+    entry: Entry, kind: str, default: str
+) -> tuple[Expression | None, el.Subroutine | None]:
+    """Return what ``expr`` is, and the subroutine where that gives it; faults go to the entry.
+
+    Parameters
+    ----------
+    entry : Entry
+    kind : str
+        Of the element, as `expressions.tree.UserResult` has it.
+    default : str
+        The function, where the deck names none.
+    """
+    if not by_user(entry, type=entry.get("type", "")):
+        return entry.get("expr"), None
+    user = subroutine(entry, "usrsub", default)
+    return result(entry, kind, user), user
 
 
 def by_user(entry: Entry, expressions: tuple[str, ...] = ("expr",), type: str = "") -> bool:

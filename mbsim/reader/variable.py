@@ -5,15 +5,12 @@ from __future__ import annotations
 from mbsim.model import elements as el
 from mbsim.reader.kinds import EXPRESSION
 from mbsim.reader.statement import NAMED, Entry, Spec, Statement
-from mbsim.reader.subroutine import BY_EITHER, USERSUB, by_user, result, subroutine
+from mbsim.reader.subroutine import GIVEN_BY, USERSUB, expression_or_user
 
 
 def _build_variable(entry: Entry) -> None:
     """Add a variable."""
-    user = None
-    if by_user(entry, type=entry.get("type", "")):
-        user = subroutine(entry, "usrsub", "VARSUB")
-    expr = entry.get("expr") if user is None else result(entry, "VARIABLE", user)
+    expr, user = expression_or_user(entry, "VARIABLE", "VARSUB")
     if expr is None:
         return
     variable = el.Variable(
@@ -30,7 +27,7 @@ REFERENCE_VARIABLE = Statement(
     "Reference_Variable",
     {
         **NAMED,
-        "type": Spec(BY_EITHER, "how it is given", "", "by what is given"),
+        "type": GIVEN_BY,
         "expr": Spec(EXPRESSION, "its value"),
         **USERSUB,
     },

@@ -16,6 +16,7 @@ from mbsim.model import elements as el
 from mbsim.model.checks import Known, check_model
 from mbsim.model.names import is_adams, is_commands
 from mbsim.reader.constraints import complete_motions
+from mbsim.reader.controls import complete_sensors
 from mbsim.reader.draft import Draft
 from mbsim.reader.keywords import fold
 from mbsim.reader.linear_systems import expand
@@ -94,6 +95,7 @@ def _read(path: Given, texts: tuple[str, ...]) -> el.Model:
     deck = Path(name)
     draft, said_so = _read_draft(name, data, texts)
     draft.faults.extend(map(said_so, expand(draft)))
+    draft.faults.extend(map(said_so, complete_sensors(draft)))
     complete_motions(draft)
     model = _to_model(draft, deck, hashlib.sha256(data + draft.more).hexdigest())
     known = Known(frozenset(draft.broken), draft.display_graphics)
@@ -291,6 +293,7 @@ def _to_model(draft: Draft, deck: Path, sha256: str) -> el.Model:
         splines=draft.splines,
         arrays=draft.arrays,
         sensors=draft.sensors,
+        evaluations=draft.evaluations,
         gravity=draft.gravity or el.Gravity(),
         transient=draft.transient or el.Transient(),
         simulations=tuple(draft.simulations),

@@ -42,6 +42,7 @@ _STATEMENTS = {
     "splines": "Reference_Spline",
     "arrays": "Reference_Array",
     "sensors": "Sensor_Event",
+    "evaluations": "Sensor_Evaluate",
     "requests": "Post_Request",
     "gravity": "Force_Gravity",
     "transient": "Param_Transient",

@@ -69,6 +69,10 @@ class HookCalls:
 
         hook = _JOINTS(int(self.system.scene.world.hooks[Hook.JOINTS]))
         code = hook(self.problem.context, what, t, y.ctypes.data, dy.ctypes.data)
+        failed = self.system.scene.users.failed
+        if failed[0] != 0:
+            # a motion's subroutine, whose code cannot be returned
+            code, failed[0] = int(failed[0]), 0
         self._look_at(code, t)
 
     def joints_at(self, t: float) -> Callable[[int, Any], None] | None:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbsim.arrays.codes import CODE_OPERAND, CODE_OPERATION
+from mbsim.arrays.codes import CODE_OPERAND, CODE_OPERATION, JET_VALUE
 from mbsim.compile_model.force_elements import STATEMENT
+from mbsim.compile_model.instructions import USER
 from mbsim.core import tags
 from mbsim.core.layout import BODY_SIZE
 from mbsim.dynamics.initial.equilibrium import FAR_AWAY, MOST_ITERATIONS, Balance, Hooks, balance
@@ -31,10 +32,11 @@ Array = np.ndarray[Any, Any]
 def standing_still(system: System, t: float) -> Iterator[None]:
     """Let TIME be a constant in all expressions, so that motions hold their displacements.
 
-    Motions that give velocities or accelerations hold what they act on where it is.
+    Motions that give velocities or accelerations hold what they act on where it is. What users'
+    motions give at that time becomes a constant of their equations.
     """
     programs, equations = system.scene.programs, system.scene.equations
-    given = equations.program.copy()
+    given, constants = equations.program.copy(), equations.constant.copy()
     rates = (given >= 0) & (equations.level < 2) & (equations.general == 0)
     times = programs.code[:, CODE_OPERATION] == TIME
     kept = programs.code.copy()
@@ -43,11 +45,35 @@ def standing_still(system: System, t: float) -> Iterator[None]:
         programs.code[times, CODE_OPERATION] = NUMBER
         programs.code[times, CODE_OPERAND] = len(programs.number) - 1
     equations.program[rates] = -1
+    for e in np.flatnonzero(equations.program >= 0):
+        row = _motion_of_user(system, int(equations.program[e]))
+        if row >= 0:
+            equations.constant[e] += _given_at(system, row, t)
+            equations.program[e] = -1
     try:
         yield
     finally:
         programs.code[...] = kept
-        equations.program[...] = given
+        equations.program[...], equations.constant[...] = given, constants
+
+
+def _motion_of_user(system: System, program: int) -> int:
+    """Return the row of the MOTSUB that is a program, -1 for none."""
+    programs = system.scene.programs
+    code = programs.code[programs.start[program] : programs.start[program + 1]]
+    only = len(code) == 1 and code[0, CODE_OPERATION] == USER
+    return int(code[0, CODE_OPERAND]) if only else -1
+
+
+def _given_at(system: System, row: int, t: float) -> float:
+    """Return the displacement that a MOTSUB gives at time t."""
+    results = system.scene.users.result[row]
+    user = list(system.subroutines.values())[row]
+    if user.called(t, results) != 0:
+        from mbsim.plugins.guard import raise_failure
+
+        raise_failure()
+    return float(results[JET_VALUE])
 
 
 def find(

@@ -107,7 +107,7 @@ def _scripts(results: Results, model: Model | None) -> list[Path]:
     """Return users' files: those of --plugin, and those that the deck names."""
     names = [name for name in str(results.attributes.get("plugins", "")).splitlines() if name]
     if model is not None:
-        users = [user for _, _, _, user, _ in wanted(model)]
+        users = [each.user for each in wanted(model)]
         for contact in model.contacts.values():
             users += [contact.cff, contact.cnf, *([contact.cpost] if contact.cpost else [])]
         names += [user.script_name for user in users if user.script_name]

@@ -149,6 +149,11 @@ def _put(text, statement, name, value, shapes):
 
 
 _OF_USERS = ("usrsub", "script", "interpreter")
+#: Statements that an expression gives in this deck, and not a subroutine.
+_BY_EITHER = (
+    *("Force_Scalar_TwoBody", "Reference_Variable", "Control_Diff", "Motion_Joint"),
+    *("Motion_Marker", "Sensor_Event", "Sensor_Evaluate"),
+)
 
 
 def _takes(statement, name):
@@ -160,7 +165,7 @@ def _takes(statement, name):
         return lambda inside: "inertia_xx" in inside
     if statement == "Post_Request":
         type = "EXPRESSION" if name.startswith("expr") else "DISPLACEMENT"
-        own = name in ("jflag", "elem_type", "elem_id")
+        own = name in ("jflag", "elem_type", "elem_id") or name.startswith(_OF_USERS)
         return lambda inside: not own and type in inside
     if statement.startswith("Force_Vector"):
         own = name[0] != "t" and not name.startswith(_OF_USERS)
@@ -169,7 +174,7 @@ def _takes(statement, name):
         return lambda inside: False
     if name in ("rotational_stiffness", "torsion_radius"):
         return lambda inside: False  # each means nothing without the other
-    if statement in ("Force_Scalar_TwoBody", "Reference_Variable"):
+    if statement in _BY_EITHER:
         return lambda inside: not name.startswith(_OF_USERS)
     if name.startswith(("cff_", "cpost_", "interpreter")) and name != "cff_type":
         return lambda inside: "USERCFF" in inside

@@ -315,7 +315,10 @@ FAULTS = {
         ('ROUTINE="a.py::F"', "no such file"),
     ),
     "user value": ("VARIABLE/1, FUNCTION=USER(1,a)", ("'a'", "is no number")),
-    "user differential": ("DIFF/1, FUNCTION=USER(1)", ("is no expression", "variables take")),
+    "user evaluation": (
+        "SENSOR/1, FUNCTION=TIME, HALT, EVALUATE=USER(1)",
+        ('EVALUATE="USER(1)"', "is no expression"),
+    ),
     "bushing": ("BUSHING/1, I=102, J=202, K=1,2", ("BUSHING[1]", "3 numbers")),
     "negative bushing": ("BUSHING/1, I=102, J=202, CT=1,2,-3", ("CT", "numbers >= 0")),
     "no part": ("MARKER/301", ("MARKER[301]", "PART: missing")),
@@ -357,8 +360,8 @@ FAULTS = {
     "joint and marker": ("MOTION/1, JOINT=1, I=102, FUNCTION=TIME", ("give JOINT, or I and J",)),
     "no joint": ("MOTION/1, JOINT=9, FUNCTION=TIME", ('JOINT="9"', "no JOINT has this id")),
     "user": (
-        "MOTION/1, JOINT=1, FUNCTION=USER(1,2)",
-        ("USER(1,2)", "is no expression", "only forces and variables"),
+        "GCON/1, FUNCTION=USER(1,2)",
+        ("USER(1,2)", "is no expression", "where the manual has it"),
     ),
     "no kind of force": ("SFORCE/1, I=102, J=202, FUNCTION=1", ("type: missing", "ROTATIONAL")),
     "wrong stiffness": ("SPRINGDAMPER/1, ROT, I=102, J=202, K=3", ('K="3"', "other type")),
@@ -367,7 +370,11 @@ FAULTS = {
     "no I": ("REQUEST/2, D", ("REQUEST[2]", "I: missing")),
     "both kinds": ("REQUEST/2, F2=1, I=102", ("REQUEST[2]", "not both")),
     "function": ("REQUEST/2, F2=FOO(3)", ('F2="FOO(3)"', "no function FOO")),
-    "user request": ("REQUEST/2, FUNCTION=USER(1)", ("not built yet; use F1 ... F8",)),
+    "user request": (
+        "REQUEST/2, FUNCTION=USER(1)\\ROUTINE=a.py::F",
+        ('ROUTINE="a.py::F"', "no such file"),
+    ),
+    "user and markers": ("REQUEST/2, D, I=102, FUNCTION=USER(1)", ("FUNCTION", "stands for all")),
     "steps": ("INTEGRATOR/HMIN=2, HMAX=1", ('HMIN="2"', "not be larger than HMAX")),
     "unknown force": ("REQUEST/2, F2=SFORCE(3,0,2,0)", ("3", "no SFORCE has this id")),
 }

@@ -373,7 +373,7 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
     "request of a user": (
         added('<Post_Request id="1" type="USERSUB"/>'),
         END_OF_MODEL,
-        ("Post_Request[1]", 'type="USERSUB"', "not built yet"),
+        ("Post_Request[1]", "usrsub_param_string: missing"),
     ),
     "picture in contact": (
         deck(('type="Sphere" center_marker_id="20" radius="0.108"', 'type="Parasolid"')),

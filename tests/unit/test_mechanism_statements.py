@@ -207,10 +207,13 @@ BAD = {
         f'{MOTION} val_type="D" expr="DX(20)"/>',
         ("Motion_Joint[1]", "uses DX", "TIME alone"),
     ),
-    "user motion": (f'{MOTION} val_type="D" type="USERSUB"/>', ("USERSUB", "not built yet")),
+    "user motion": (
+        f'{MOTION} val_type="D" type="USERSUB"/>',
+        ("usrsub_param_string: missing",),
+    ),
     "user function": (
-        f'{MOTION} val_type="D" expr="1" usrsub_fnc_name="MOTSUB"/>',
-        ('usrsub_fnc_name="MOTSUB"', "not built yet; give expr"),
+        f'{MOTION} val_type="D" expr="1" usrsub_param_string="USER()"/>',
+        ('expr="1"', "is given by a user subroutine"),
     ),
     "no expression": (
         f'{MOTION} val_type="D" expr="2*(TIME"/>',

@@ -40,6 +40,7 @@ from mbsim.compile_model.instructions import (
     STATE_AT,
     TURN,
     TURNING,
+    USER,
     VELOCITY,
     WHICH,
 )
@@ -65,6 +66,7 @@ from mbsim.dynamics.expressions.measures import (
 )
 from mbsim.dynamics.expressions.slopes import slope
 from mbsim.dynamics.expressions.splines import spline
+from mbsim.dynamics.expressions.subroutines import user_jet
 from mbsim.expressions.elementary import FIRST_MEASURE, NUMBER, TIME, apply, constant, get, put
 
 
@@ -156,6 +158,9 @@ def interpret(scene: Scene, t: float, y: F1, program: int, body: int, direction:
             x, z = get(stack, top - 1), get(stack, top)
             first, count, order = code[FIRST_CURVE], code[CURVES], code[ORDER]
             put(stack, top - 1, spline(programs, first, count, order, x, z))
+        elif op == USER:
+            put(stack, top, user_jet(scene, t, y, code[ROW], body))
+            top += 1
         else:
             rise = slope(scene, y, code, body, direction)
             put(stack, top, (rate_or_force(scene, y, code), rise, 0.0))

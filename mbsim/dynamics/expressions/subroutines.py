@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import PYTHON_CALLS
+from mbsim.arrays.codes import JET_CURVATURE, JET_SLOPE, PYTHON_CALLS
 from mbsim.arrays.hooks import Hook, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
-from mbsim.core.arrays import F1
+from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
+from mbsim.dynamics.expressions.measures import AS_THEY_ARE
 
 
 @jitable
@@ -34,3 +35,13 @@ def user_result(scene: Scene, t: float, y: F1, row: int, component: int, calls: 
             for k in range(users.result.shape[1]):
                 users.result[row, k] = math.nan
     return users.result[row, component]
+
+
+@jitable
+def user_jet(scene: Scene, t: float, y: F1, row: int, body: int) -> V3:
+    """Return value, rate and second rate that the subroutine of a motion gives."""
+    value = user_result(scene, t, y, row, 0, 1)
+    if body != AS_THEY_ARE:
+        return value, 0.0, 0.0
+    result = scene.users.result[row]
+    return value, result[JET_SLOPE], result[JET_CURVATURE]

@@ -6,6 +6,7 @@ from mbsim.model import elements as el
 from mbsim.model.frames import GLOBAL
 from mbsim.reader import units
 from mbsim.reader.adm.draft import draft_of, frame_of, require
+from mbsim.reader.adm.subroutine import function_or_user
 from mbsim.reader.constraints import note_unused_starts
 from mbsim.reader.kinds import ID
 from mbsim.reader.points import INERTIA
@@ -211,6 +212,7 @@ def build_motion(entry: Entry) -> None:
     """Add a motion."""
     val_type = entry.get("VALUE", "DISPLACEMENT")[0]
     note_unused_starts(entry, val_type, "ICDISP", "ICVEL")
+    expr, user = function_or_user(entry, "MOTION", "MOTSUB")
     motion = el.Motion(
         id=entry.get("id", 0),
         joint_id=entry.get("JOINT"),
@@ -218,7 +220,8 @@ def build_motion(entry: Entry) -> None:
         j_marker_id=entry.get("J", 0),
         direction=_motion_direction(entry),
         val_type=val_type,
-        expr=entry.get("FUNCTION"),
+        expr=expr,
+        user=user,
         ic_disp=entry.get("ICDISP") if val_type != "D" else None,
         ic_vel=entry.get("ICVEL") if val_type == "A" else None,
         source=entry.source,

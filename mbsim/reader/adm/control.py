@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from mbsim.model import elements as el
 from mbsim.reader.adm.draft import require
-from mbsim.reader.adm.subroutine import function_or_user
+from mbsim.reader.adm.subroutine import function_or_user, routine
 from mbsim.reader.adm.translate import read_as
 from mbsim.reader.command import PARAM_STATIC
 from mbsim.reader.controls import add_sensor
 from mbsim.reader.kinds import ID
+from mbsim.reader.requests import user_results
 from mbsim.reader.statement import Entry
 from mbsim.reader.tables import add_array, add_spline
 
@@ -27,12 +28,14 @@ def build_variable(entry: Entry) -> None:
 
 def build_differential(entry: Entry) -> None:
     """Add a state."""
-    if entry.get("FUNCTION") is not None:
+    expr, user = function_or_user(entry, "DIFF", "DIFSUB")
+    if expr is not None:
         state = el.Differential(
             entry.get("id", 0),
-            entry.get("FUNCTION"),
+            expr,
             entry.get("IC", 0.0),
             is_static_hold=entry.get("STATIC_HOLD", False),
+            user=user,
             source=entry.source,
         )
         entry.register(entry.draft.differentials, state)
@@ -61,11 +64,13 @@ def build_array(entry: Entry) -> None:
 
 def build_sensor(entry: Entry) -> None:
     """Add a sensor."""
-    if entry.get("FUNCTION") is None:
+    expr, user = function_or_user(entry, "SENSOR", "SENSUB")
+    if expr is None:
         return
     sensor = el.Sensor(
         entry.get("id", 0),
-        entry.get("FUNCTION"),
+        expr,
+        user=user,
         compare=entry.get("COMPARE", "EQ"),
         value=entry.get("VALUE", 0.0),
         error_tol=entry.get("ERROR", 1e-3),
@@ -90,24 +95,31 @@ FUNCTIONS = tuple(f"F{k}" for k in range(1, 9))
 def build_request(entry: Entry) -> None:
     """Add a request, by markers or by functions."""
     word = entry.get("TYPE")
+    user = routine(entry, "REQSUB")
     functions = [name for name in FUNCTIONS if entry.given(name)]
     by_markers = [name for name in ("I", "J", "RM") if entry.given(name)]
-    if word is None and not functions:
-        require(entry, "TYPE", ", or functions F1 ... F8")
+    if word is None and not functions and not entry.given("FUNCTION"):
+        require(entry, "TYPE", ", functions F1 ... F8, or FUNCTION=USER(...)")
+    if entry.given("FUNCTION") and (functions or word or by_markers):
+        entry.fault("stands for all of a request; TYPE, markers or F1 ... F8 are given", "FUNCTION")
     if functions and (word or by_markers):
         other = ", ".join(([word] if word else []) + by_markers)
         entry.fault(f"give functions or markers, not both ({', '.join(functions)} and {other})")
     if word is not None and not entry.given("I"):
         entry.fault(f"I: missing; must be {ID.allowed}")
+    exprs = tuple(entry.get(name) for name in FUNCTIONS) if functions else ()
+    if user is not None:
+        exprs = user_results(entry, user)
     request = el.Request(
         id=entry.get("id", 0),
-        type="EXPRESSION" if functions else f"MARKER_{word}",
+        type="EXPRESSION" if functions or user else f"MARKER_{word}",
         label=entry.get("TITLE", ""),
         comment=entry.get("COMMENT", ""),
         i_marker_id=entry.get("I", 0),
         j_marker_id=entry.get("J"),
         ref_marker_id=entry.get("RM"),
-        exprs=tuple(entry.get(name) for name in FUNCTIONS) if functions else (),
+        exprs=exprs,
+        user=user,
         source=entry.source,
     )
     entry.register(entry.draft.requests, request)
