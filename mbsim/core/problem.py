@@ -26,7 +26,9 @@ to the committed one before the run ends, but for codes from AT_ONCE on.
 |         |                        | changes of speeds in impacts, over what these changed by   |
 |         |                        | in the step, t being its length; h = EACH: of RATES such   |
 |         |                        | differences, one behind the other, each as with h = 0 and  |
-|         |                        | left in its first number. Asked for AUTO alone             |
+|         |                        | left in its first number. Asked for AUTO alone; h = YIELDS,|
+|         |                        | of a problem that owns its contacts: the part of its step, |
+|         |                        | of length t, at which friction yields that held, else 1    |
 | check   | y new, -               | 1, or the part of the step to take instead                 |
 | inner   | -, tolerance           | part of the step (0..1) worth a look, or < 0; h = 0, after |
 |         |                        | a look: the next one                                       |
@@ -177,6 +179,8 @@ STABLE_EVERY = 16
 #: RATES vectors at once.
 FRICTION_ALONE, IMPACTS_ALONE, EACH = -1.0, -2.0, -3.0
 RATES = 7
+#: What `norm` is given for h where it is to say when friction yields.
+YIELDS = -4.0
 
 #: What `project` is given for h where velocities in y are displacements.
 ALONG = -1.0

@@ -17,9 +17,10 @@ from mbsim.core.arrays import F1, F2, F3, F4, I1, I2
 #: Speeds at which a coefficient of friction is tabled, and the step of their logarithm's base 2.
 SPEEDS = 64
 # entries of `Rules.number`, of each contact: slip speed of the table's first entry, coefficient
-# where it sticks, restitution, closing speed below which there is none
-FIRST_SPEED, STICKING, RESTITUTION, SLOWEST = range(4)
-RULE_NUMBERS = 4
+# where it sticks, restitution, closing speed below which there is none, 1 where the coefficient
+# jumps as what sticks yields
+FIRST_SPEED, STICKING, RESTITUTION, SLOWEST, DROPS = range(5)
+RULE_NUMBERS = 5
 # entries of `Kept.table`: a contact point of the last step that was taken; force is on I's body
 (
     KEPT_CONTACT,
@@ -42,14 +43,20 @@ KEPT_COLUMNS = 26
 # entries of `Plan.number`: 1 where the error of steps is not estimated; lengths below which gaps
 # and changes of position do not count; what the solver may leave of a velocity, times h; 1 where
 # some kind of pair is not near; how fast positions are projected, see `solver.project_positions`;
-# what may be left of a velocity at most, however short a step; and part of a step's jumps that may
-FIXED, SLOP, LEFT, SOME_AHEAD, PUSH_SPEED, LEFT_SPEED, LEFT_PART = range(7)
-PLAN_NUMBERS = 7
+# what may be left of a velocity at most, however short a step; and part of a step's jumps that may;
+# how near to where friction yields a step is to end; the model's own time L/V
+FIXED, SLOP, LEFT, SOME_AHEAD, PUSH_SPEED, LEFT_SPEED, LEFT_PART, NEAR, OWN_TIME = range(9)
+PLAN_NUMBERS = 9
 # entries of `Tally.number`, of the last step tried: what the solver left, as a velocity; its
 # length; the contact that closed fastest in it, and by how much within its length; how far its end
 # is from that of two halves; 1 where velocities jump in it or in either of two halves
 RESIDUAL, STEP_LENGTH, FASTEST, CLOSED, END_OFF, HIT = range(6)
 TALLY_NUMBERS = 6
+# entries of `Tally.load`: of the step tried last, its first half and its second; 1 where friction
+# yields at the begin of the step at hand, as far as is known; else how long after that, as the last
+# step saw it
+OF_WHOLE, OF_FIRST, OF_SECOND, DUE, AHEAD = range(5)
+LOADS = 5
 # entries of `Tally.count`: contact points, points that press, sweeps so far, steps tried so far,
 # steps that were left unsolved, steps with positions projected, Newton iterations so far, points
 # so far, steps of the deck's length that were compared with two halves
@@ -152,7 +159,7 @@ class Tally(NamedTuple):
 
     number: F1  # (TALLY_NUMBERS,)
     count: I1  # type: ignore[assignment]  # (TALLY_COUNTS,)
-    load: F2  # (nc, 2) friction of pairs that stick over the most it may be, of a step's halves
+    load: F2  # (nc, LOADS) friction of pairs that stick over the most it may be
     deepest: F1  # (nc,) depth of each contact at the begins of the parts of the step tried last
 
 
@@ -233,5 +240,6 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int]) -
     room = 1 << max(4, int(4 * m - 1).bit_length())
     kept = Kept(whole(1), whole(m), np.zeros((m, KEPT_COLUMNS)), whole(room))
     nc = len(rules.number)
-    tally = Tally(np.zeros(TALLY_NUMBERS), whole(TALLY_COUNTS), numbers(nc, 2), numbers(nc))
+    tally = Tally(np.zeros(TALLY_NUMBERS), whole(TALLY_COUNTS), numbers(nc, LOADS), numbers(nc))
+    tally.load[:, DUE] = 1.0
     return Stepping(rules, plan, motion, points, kept, tally)

@@ -27,6 +27,7 @@ from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
 from mbsim.laws.impact_test import impact_of
 from mbsim.model.names import element_name
 from mbsim.stepping.arrays import (
+    DROPS,
     FIRST_SPEED,
     RESTITUTION,
     RULE_NUMBERS,
@@ -47,6 +48,8 @@ _LAW = ctypes.CFUNCTYPE(
 _MEMORY = max(FRICTION_LAWS[name].memory + FRICTION_LAWS[name].carried for name in FRICTION_LAWS)
 #: Slip speeds at which a law is asked, over the model's own speed: from, to, and how many.
 SLOWEST_ASKED, FASTEST_ASKED, ASKED = 1e-7, 1e2, 721
+#: A slip, over the model's own speed, up to which what gives before it slips is at rest.
+AT_REST = 1e-12
 #: What friction may change by where a law looks at what rigid contact does not know.
 SAME = 1e-6
 #: Part of the largest coefficient from which on contact slips.
@@ -66,6 +69,8 @@ class Coefficients:
         for c, contact in enumerate(contacts):
             number = self.rules.number[c]
             self._friction(c, contact)
+            drop = number[STICKING] - self.rules.curve[c, 0]
+            number[DROPS] = float(drop > (1.0 - NEARLY) * number[STICKING])
             number[RESTITUTION] = self._restitution(contact)
             if contact.cnf_type == "POISSON":
                 number[SLOWEST] = contact.normal_trans_vel
@@ -100,7 +105,7 @@ class Coefficients:
                 )
             if law.memory:
                 # what such a law keeps is the give that rigid contact has not
-                number[FIRST_SPEED] = SLOWEST_ASKED * float(self.system.scene.world.scale[1])
+                number[FIRST_SPEED] = AT_REST * float(self.system.scene.world.scale[1])
                 number[STICKING] = max(contact.mu_static, contact.mu_dynamic)
                 curve[:] = contact.mu_dynamic
                 self.said.append(

@@ -6,14 +6,38 @@ import math
 
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, norm, scale, vector
-from mbsim.stepping.arrays import FIRST_SPEED, LEFT, LEFT_SPEED, SPEEDS, STICKING, Stepping
+from mbsim.stepping.arrays import (
+    AHEAD,
+    DROPS,
+    DUE,
+    FIRST_SPEED,
+    LEFT,
+    LEFT_SPEED,
+    NEAR,
+    OF_FIRST,
+    OF_SECOND,
+    OF_WHOLE,
+    OWN_TIME,
+    PUSH_SPEED,
+    SPEEDS,
+    STICKING,
+    Stepping,
+)
 from mbsim.stepping.solver import velocity_of
 
 #: Closing speeds have no restitution, and slips are none, up to so many times what the solver may
 #: leave of a velocity.
 NOISE = 30.0
-#: Changes of mu that do not count, and loads that are as large as they may be.
+#: Changes of mu that do not count.
 YIELDS = 1e-3
+#: A load as large as it may be.
+SATURATED = 1.0 - 1e-9
+#: Loads from which on they are to be known, and how well, over tol.
+CLOSE, SHARPER = 0.9, 1e-5
+#: Friction that yields so near to a step's end, over its length, yields there.
+AT_END = 2e-3
+#: A step goes so far of what is left to where friction yields, while that is not known well.
+CLOSER = 0.6
 
 
 @jitable
@@ -60,8 +84,8 @@ def load_of(S: Stepping, begin: int, end: int) -> float:
 def let_yield(S: Stepping, count: int, allowed: float) -> bool:
     """Lower mu where what stuck slips, to that of its slip; return whether that changed much.
 
-    A step in which friction yields is then one that slides: how long it stuck in it is what
-    halves of the step tell.
+    A step in which friction yields is then one that slides from its begin: steps by error end where
+    it yields (`part_to_yield`).
     """
     P, M, changed, begin = S.points, S.motion, False, 0
     while begin < count:
@@ -75,11 +99,9 @@ def let_yield(S: Stepping, count: int, allowed: float) -> bool:
             i, j = P.body[k, 0], P.body[k, 1]
             x, z = velocity_of(P.H, k, 1, M.v, i, j), velocity_of(P.H, k, 2, M.v, i, j)
             slip = math.sqrt(x * x + z * z)
-            if slip <= allowed:
-                continue
             if load < 0.0:
                 load = load_of(S, begin, end)
-            if load < 1.0 - YIELDS and slip <= NOISE * allowed:
+            if load < SATURATED and slip <= NOISE * allowed:
                 continue
             mu = coefficient(S, P.contact[k], slip)
             if mu < (1.0 - YIELDS) * P.mu[k]:
@@ -90,31 +112,132 @@ def let_yield(S: Stepping, count: int, allowed: float) -> bool:
 
 
 @jitable
+def let_stick(S: Stepping, count: int, noise: float) -> bool:
+    """Let a pair stick by all it can whose slip turns round in the step; return whether one does.
+
+    Or begins below `noise`. On its way it stops: whether it goes on then is for its sticking
+    friction to say.
+    """
+    P, M, changed = S.points, S.motion, False
+    for k in range(count):
+        sticking = S.rules.number[P.contact[k], STICKING]
+        if P.r[k, 0] == 0.0 or P.holds[k] >= sticking:
+            continue
+        i, j, along, square = P.body[k, 0], P.body[k, 1], 0.0, 0.0
+        for a in range(1, 3):
+            before = velocity_of(P.H, k, a, M.before, i, j)
+            along += before * velocity_of(P.H, k, a, M.v, i, j)
+            square += before * before
+        if along < 0.0 or square <= noise * noise:
+            P.holds[k] = P.mu[k] = sticking
+            changed = True
+    return changed
+
+
+@jitable
+def left_near_yield(S: Stepping, count: int) -> float:
+    """Return what may be left of a velocity where friction is about to yield, inf where none is.
+
+    So exactly is the load known then.
+    """
+    P, least, begin = S.points, math.inf, 0
+    tol = S.plan.number[LEFT_SPEED] / S.plan.number[PUSH_SPEED]
+    while begin < count:
+        end, c, most = begin + 1, P.contact[begin], P.mu[begin] * P.r[begin, 0]
+        while end < count and P.key[end] == P.key[begin]:
+            most += P.mu[end] * P.r[end, 0]
+            end += 1
+        rule = S.rules.number[c]
+        drops = rule[DROPS] == 1.0 and P.holds[begin] >= rule[STICKING]
+        if drops and most > 0.0 and load_of(S, begin, end) > CLOSE:
+            least = min(least, SHARPER * tol * most * max(P.W[begin, 1, 1], P.W[begin, 2, 2]))
+        begin = end
+    return least
+
+
+@jitable
 def keep_loads(S: Stepping, count: int, committed: bool) -> None:
-    """Keep the largest load of each contact's pairs that stick, of the first half or the second."""
-    P, loads, half, begin = S.points, S.tally.load, 0 if committed else 1, 0
+    """Keep the largest load of each contact's pairs that stick, -1 for none.
+
+    It is asked in turn of a step, its first half, its second half.
+    """
+    P, loads, begin = S.points, S.tally.load, 0
     for c in range(len(loads)):
-        loads[c, half] = 0.0
+        if committed:
+            loads[c, OF_WHOLE] = loads[c, OF_FIRST]
+        loads[c, OF_FIRST if committed else OF_SECOND] = -1.0
     while begin < count:
         end, c = begin + 1, P.contact[begin]
         while end < count and P.key[end] == P.key[begin]:
             end += 1
         if P.holds[begin] >= S.rules.number[c, STICKING] > 0.0:
-            loads[c, half] = max(loads[c, half], load_of(S, begin, end))
+            at = OF_FIRST if committed else OF_SECOND
+            loads[c, at] = max(loads[c, at], load_of(S, begin, end))
         begin = end
 
 
 @jitable
-def overdue(S: Stepping, h: float) -> float:
-    """Return how long before the end of a step h what sticks yields, if its load goes on to grow.
+def yields_at(first: float, whole: float, second: float) -> tuple[float, float]:
+    """Return the part of a step at which a load gets to 1, inf for never, and how sure that is.
 
-    The halves know the load at a quarter and at three quarters of the step alone.
+    Loads are those at 1/4, 1/2 and 3/4 of it. A straight line through the last two says something
+    else about where it gets there than a parabola through all: that is how sure.
     """
-    late = 0.0
+    slope = 4.0 * (second - whole)
+    bent = 8.0 * (second - 2.0 * whole + first)
+    # load(s) = second + (slope + bent/4) d + bent d^2, d = s - 3/4
+    rate, short = slope + 0.25 * bent, 1.0 - second
+    root = rate * rate + 4.0 * bent * short
+    if root < 0.0 or rate + math.sqrt(root) <= 0.0:
+        return math.inf, 0.0
+    at = 2.0 * short / (rate + math.sqrt(root))
+    straight = short / slope if slope > 0.0 else 0.25
+    return 0.75 + at, abs(at - straight)
+
+
+@jitable
+def part_to_yield(S: Stepping, h: float) -> float:
+    """Return the part of a step h at which friction yields that stuck at its begin, 1 for none.
+
+    Where a contact's coefficient drops as it yields its force jumps; where it does not, it needs no
+    end of a step. It is found to `NEAR` by steps that end there; one that begins there slides.
+    """
+    part, near = 1.0, max(S.plan.number[NEAR] / h, AT_END)
     for c in range(len(S.tally.load)):
-        first, last = S.tally.load[c, 0], S.tally.load[c, 1]
-        growth = last - first
-        beyond = last + 0.5 * growth - 1.0
-        if last < 1.0 - YIELDS and beyond > 0.0:
-            late = max(late, 0.5 * h * beyond / growth)
-    return late
+        load = S.tally.load[c]
+        if S.rules.number[c, DROPS] == 0.0 or load[DUE] == 1.0 or load[OF_FIRST] < 0.0:
+            continue
+        first, whole, second = load[OF_FIRST], load[OF_WHOLE], load[OF_SECOND]
+        if first < SATURATED and 0.0 <= whole < SATURATED and 0.0 <= second < SATURATED:
+            at, unsure = yields_at(first, whole, second)
+            if at < 1.0 + near and unsure * min(h / S.plan.number[OWN_TIME], 1.0) > near:
+                part = min(part, CLOSER * at)
+            elif at < 1.0 - near:
+                part = min(part, at)
+        elif near < 0.5:
+            # it has yielded in the step, before its last quarter
+            at = load[AHEAD] / h
+            if not 0.0 < at < 1.0 - near:
+                at = 0.5
+                if first < SATURATED and first < whole < SATURATED:
+                    at = 0.25 + 0.25 * (1.0 - first) / (whole - first)
+                elif first >= SATURATED:
+                    at = 0.25
+            part = min(part, max(min(at, 0.9), near))
+    return part
+
+
+@jitable
+def keep_yield(S: Stepping, h: float) -> None:
+    """Note of the step that is taken how long behind its end friction yields, or whether there."""
+    near = max(S.plan.number[NEAR] / h, AT_END)
+    for c in range(len(S.tally.load)):
+        load = S.tally.load[c]
+        first, whole, second = load[OF_FIRST], load[OF_WHOLE], load[OF_SECOND]
+        due = second < 0.0 or second >= SATURATED
+        load[AHEAD] = math.inf
+        if not due and 0.0 <= first < SATURATED and 0.0 <= whole < SATURATED:
+            at = yields_at(first, whole, second)[0]
+            load[AHEAD] = (at - 1.0) * h
+            due = at <= 1.0 + near
+        load[DUE] = 1.0 if due else 0.0

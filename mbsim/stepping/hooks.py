@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import LISTINGS, SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.codes import LISTINGS
 from mbsim.arrays.hooks import Contacts, Hook, Joints, failure_or
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, vector_at, view
 from mbsim.core.arrays import F1, Pointer
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import Taken
+from mbsim.core.problem import YIELDS, Taken
 from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics
 from mbsim.dynamics.bodies.scales import take_speeds
 from mbsim.dynamics.contact.detection import find_contacts
@@ -20,7 +20,7 @@ from mbsim.dynamics.pipeline.output import no_room, scaled_error
 from mbsim.stepping.arrays import ALL_STEPS, FIXED, HIT, Stepping
 from mbsim.stepping.audit import examine_step
 from mbsim.stepping.displacements import place_within
-from mbsim.stepping.friction import overdue
+from mbsim.stepping.friction import keep_yield, part_to_yield
 from mbsim.stepping.halves import take_fixed_step
 from mbsim.stepping.pairs import commit_distances
 from mbsim.stepping.rows import (
@@ -100,16 +100,19 @@ def step(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
 
 
 def norm(context: int, t: float, h: float, a: Pointer, b: Pointer) -> float:
-    """The scaled error of positions; none where steps are as long as the deck says."""
+    """The scaled error of positions; none where steps are as long as the deck says.
+
+    With h = YIELDS the part of the step t at which friction yields.
+    """
     scene = view(context, Scene)
     S = view(scene.world.hooks[Hook.STEPPING], Stepping)
     if S.plan.number[FIXED] == 1.0:
         return 0.0
+    if h == YIELDS:
+        # what an impact does to friction is no growing load
+        return part_to_yield(S, t) if S.tally.number[HIT] == 0.0 else 1.0
     n = scene.rows.y.shape[1]
-    error = scaled_error(scene, math.inf if h > 0.0 else h, vector_at(a, n), vector_at(b, n))
-    # what would have slid for so long, at the model's own acceleration V^2/L
-    part = overdue(S, h) * scene.world.scale[SCALE_SPEED] / scene.world.scale[SCALE_LENGTH]
-    return max(error, 0.5 * part * part) if h > 0.0 else error
+    return scaled_error(scene, math.inf if h > 0.0 else h, vector_at(a, n), vector_at(b, n))
 
 
 def commit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
@@ -124,6 +127,8 @@ def commit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     y = vector_at(a, scene.rows.y.shape[1])
     take_speeds(scene, y, scene.state.fastest)
     accept(scene, t, h, y)
+    if h > 0.0 and S.plan.number[FIXED] == 0.0:
+        keep_yield(S, h)
     examine_step(scene, S, t, h, y)
     word = 0
     if no_room(scene):

@@ -15,11 +15,12 @@ from __future__ import annotations
 from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1, F2, Pointer
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import POSITION, VELOCITY, Problem
+from mbsim.core.problem import POSITION, VELOCITY, YIELDS, Problem
 from mbsim.integrators.scheme import (
     EVALUATIONS,
     HITS,
     LAST_ERROR,
+    REACH,
     TOL,
     Method,
     Scheme,
@@ -127,6 +128,7 @@ def attempt(p: Problem, m: Method, t: float, h: float) -> int:
             m.error[i] = end if abs(end) > abs(half) else half
     error = call_float(p.norm, (p.context, t, h, m.error, m.trial))
     m.memory[LAST_ERROR] = error / m.memory[TOL]
+    m.memory[REACH] = call_float(p.norm, (p.context, h, YIELDS, m.error, m.trial))
     return 0
 
 

@@ -22,7 +22,9 @@ from mbsim.stepping.arrays import (
     LEFT,
     LEFT_PART,
     LEFT_SPEED,
+    NEAR,
     NEWTONS,
+    OWN_TIME,
     PLAN_NUMBERS,
     PROJECTED,
     PUSH_SPEED,
@@ -129,6 +131,8 @@ def _plan(system: System, fixed: bool, tol: float) -> Plan:
     number[PUSH_SPEED] = float(scene.world.scale[SCALE_SPEED])
     number[LEFT_SPEED] = tol * number[PUSH_SPEED]
     number[LEFT_PART] = min(JUMPS * tol, MOST_JUMPS)
+    number[OWN_TIME] = length / number[PUSH_SPEED]
+    number[NEAR] = tol * number[OWN_TIME]
     number[SLOP], number[LEFT] = COUNTS * tol * length, LEAVES * tol * length
     return Plan(number, near, rows, group, members, first)
 

@@ -68,7 +68,7 @@ from mbsim.stepping.displacements import (
     spread_parts,
     velocities_jump,
 )
-from mbsim.stepping.friction import NOISE, coefficient, keep_loads, left_of, let_yield
+from mbsim.stepping.friction import NOISE, coefficient, keep_loads, left_near_yield, left_of, let_stick, let_yield
 from mbsim.stepping.kept import index_kept, recall
 from mbsim.stepping.pairs import find_missed, find_points
 from mbsim.stepping.points import fill_point, fill_reach, way_at
@@ -355,11 +355,14 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
         tally.count[NEWTONS] += newtons
         if not math.isfinite(left):
             return Code.NOT_FINITE
-        postponed = postpone(S, count, h)
-        if not let_yield(S, count, allowed) and not postponed:
+        near = left_near_yield(S, count)
+        if near < allowed:
+            allowed = near
+            continue
+        changed = postpone(S, count, h)
+        changed = let_stick(S, count, NOISE * left_of(S, h)) or changed
+        if not let_yield(S, count, allowed) and not changed:
             break
-    if S.plan.number[FIXED] == 0.0:
-        keep_loads(S, count, committed)
     spread_parts(S, count, h, slop, nb)
     fill_shift(S, nb)
     most = max(DEEP * slop, h * S.plan.number[PUSH_SPEED])
@@ -447,6 +450,8 @@ def take_step(
     code = solve_all(scene, S, t, h, y, committed)
     if code != 0:
         return code
+    if S.plan.number[FIXED] == 0.0:
+        keep_loads(S, S.tally.count[POINTS], committed)
     for k in range(BODY_SIZE * len(scene.bodies.mass), len(y)):
         new[k] = y[k] + h * dy[k]
     move_bodies(scene, S, y, h, new)
