@@ -28,6 +28,9 @@ from mbsim.stepping.step import take_step
 
 #: What impacts may leave off without a word, over tol times the length: `results.audit`.
 SAID = 100.0
+#: Error of a step over what it differs from two halves of it: across an impact it is of order 1, and
+#: theirs is half of it (L. F. Richardson, Phil. Trans. R. Soc. A 210 (1911) 307).
+RICHARDSON = 2.0
 #: Steps that are compared in any case; once so many were, and it was said that steps are too long,
 #: others are where they may be so many times worse.
 MANY, WORSE = 32, 10.0
@@ -106,5 +109,5 @@ def take_fixed_step(scene: Scene, S: Stepping, t: float, h: float, y: F1, new: F
     end = 0.0
     for b in range(len(scene.bodies.mass)):
         end = max(end, distance(scene, b, new, half[1]))
-    number[END_OFF] = end
+    number[END_OFF] = RICHARDSON * end
     return take_part(scene, S, t, h, y, new, True)
