@@ -28,8 +28,8 @@ from mbsim.stepping.step import take_step
 
 #: What impacts may leave off without a word, over tol times the length: `results.audit`.
 SAID = 100.0
-#: Error of a step over what it differs from two halves of it: across an impact it is of order 1, and
-#: theirs is half of it (L. F. Richardson, Phil. Trans. R. Soc. A 210 (1911) 307).
+#: Error of a step over what it differs from two halves of it: across an impact it is of order 1,
+#: and theirs is half of it (L. F. Richardson, Phil. Trans. R. Soc. A 210 (1911) 307).
 RICHARDSON = 2.0
 #: Steps that are compared in any case; once so many were, and it was said that steps are too long,
 #: others are where they may be so many times worse.

@@ -68,7 +68,15 @@ from mbsim.stepping.displacements import (
     spread_parts,
     velocities_jump,
 )
-from mbsim.stepping.friction import NOISE, coefficient, keep_loads, left_near_yield, left_of, let_stick, let_yield
+from mbsim.stepping.friction import (
+    NOISE,
+    coefficient,
+    keep_loads,
+    left_near_yield,
+    left_of,
+    let_stick,
+    let_yield,
+)
 from mbsim.stepping.kept import index_kept, recall
 from mbsim.stepping.pairs import find_missed, find_points
 from mbsim.stepping.points import fill_point, fill_reach, way_at
