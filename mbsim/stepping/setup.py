@@ -48,6 +48,7 @@ COMPLIANT = frozenset(
         Hook.TILTING,
         Hook.RECALL,
         Hook.SPREAD,
+        Hook.RIM,
         Hook.HOLD_BACK,
         Hook.STICKING,
         Hook.CONTACT_SLOPES,

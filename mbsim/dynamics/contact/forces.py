@@ -235,6 +235,8 @@ def friction(
         given[SLIDING_LIMIT] = work.slot[s, LIMIT] = math.hypot(out[FORCE_X_OUT], out[FORCE_Y_OUT])
     if contacts.spreads[c] == 1 and is_patch(scene, s):
         return call_int(scene.world.hooks[Hook.SPREAD], (scene, s, c))
+    if contacts.rims[c] == 1:
+        return call_int(scene.world.hooks[Hook.RIM], (scene, s, c))
     call = (contacts.id[c], given, contacts.friction_par[c], out)
     return call_int(contacts.friction_law[c], call)
 

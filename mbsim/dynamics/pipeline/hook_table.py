@@ -102,6 +102,10 @@ def _spreads(scene: Scene, method: Method) -> bool:
     return bool(scene.contacts.spreads[patches].any())
 
 
+def _has_rims(scene: Scene, method: Method) -> bool:
+    return bool(scene.contacts.rims.any())
+
+
 def _has_contact_slopes(scene: Scene, method: Method) -> bool:
     return method.tangent is not None and _has_contacts(scene, method)
 
@@ -296,6 +300,13 @@ TABLE = (
         _spreads,
         _of("pipeline.contact_hooks", "friction_of_patch"),
         "asks a friction law all over a patch",
+    ),
+    Row(
+        Hook.RIM,
+        _INT(_INT, _INT, _INT),  # context, slot, contact
+        _has_rims,
+        _of("pipeline.contact_hooks", "friction_of_rim"),
+        "asks a friction law all round the rim that a body stands on",
     ),
     Row(
         Hook.HOLD_BACK,
