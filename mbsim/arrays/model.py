@@ -71,7 +71,7 @@ class Contacts(NamedTuple):
     memory: I1  # (nc,) numbers that the friction law keeps
     carried: I1  # (nc,) how many of these are part of y
     spreads: I1  # (nc,) 1 where the law is asked all over a patch: `contact.spreading`
-    rims: I1  # (nc,) 1 where the law is asked all round a rim: `contact.rims`
+    rims: I1  # (nc,) how the law is asked on a rim, AT_POINTS, ...: `contact.rims`
     numbers: F2  # (nc, ...) of the deck, but for the laws' own: see dynamics.contact.forces
     dmax: F1  # (nc,) 0 if not given
     reads_x: I1  # (nc,) 1 where an error of X counts

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbsim.arrays import codes
+from mbsim.arrays.codes import AROUND_RIM, AT_PLACES, AT_POINTS, STRETCH
 from mbsim.arrays.model import Contacts, Graphics, Kinds, Slots
 from mbsim.arrays.state import Broadphase, Pairs
 from mbsim.compile_model.pairing import (
@@ -24,7 +25,6 @@ from mbsim.compile_model.pairing import (
 from mbsim.compile_model.surfaces import Need, needed_as_triangles, packed_surfaces, thickness
 from mbsim.core import jit
 from mbsim.core.layout import BODY_SIZE
-from mbsim.dynamics.contact.rims import KEPT, STRETCH
 from mbsim.geometry.catalog import NEARS, PAIRS, REGION_ROWS, REGIONS, SIZE, Pair
 from mbsim.laws import abi
 from mbsim.laws.catalog import NORMAL_LAWS, FrictionLaw, friction_law_of
@@ -271,9 +271,12 @@ def _full_damping_depth(contact: Contact) -> float:
     return _or(contact.dmax, 0.0) if read and contact.damping else 0.0
 
 
-def over_rims(law: FrictionLaw) -> bool:
-    """Return whether a law is asked all round a rim: it keeps nothing, or integrates a stretch."""
-    return not law.uses_x and not law.modes and law.memory == law.carried in (0, STRETCH)
+def on_rims(law: FrictionLaw, with_function: bool) -> int:
+    """Return how a law is asked on a rim; `with_function`: a user's gives its sliding friction."""
+    if law.modes:
+        return AT_PLACES if law.carried == STRETCH and not with_function else AT_POINTS
+    around = not law.uses_x and law.memory == law.carried in (0, STRETCH)
+    return AROUND_RIM if around else AT_POINTS
 
 
 def contacts_table(
@@ -310,9 +313,11 @@ def contacts_table(
             uses_x[k], memory[k] = friction_law.uses_x, friction_law.memory
             carried[k] = friction_law.carried
             spreads[k] = not (memory[k] or uses_x[k] or friction_law.of_area)
-            rims[k] = contact.id in with_rims and over_rims(friction_law)
+            if contact.id in with_rims:
+                rims[k] = on_rims(friction_law, contact.id in user)
             if rims[k] and memory[k]:
-                memory[k] = carried[k] = KEPT
+                memory[k] += 1
+                carried[k] += rims[k] == AROUND_RIM
 
     def table(rows: Sequence[np.ndarray[Any, Any]]) -> np.ndarray[Any, Any]:
         wide = np.zeros((n, max([1, *map(len, rows)])))

@@ -21,26 +21,33 @@ can make of it,
 
 so it has a number more: y [L]. Where a point has its own friction that law knows z alone, and y is
 forgotten over a way of r.
+
+A law that tells sticking from slipping has one place for each point, which keeps its angle in the
+incident marker: the first lies where the middle of the rim slips to when it touches, the others 120
+degrees to both sides. What rubs there is the part of N that the linear pressure has at them.
 """
 
 from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import FRICTION_CALLS
+from mbsim.arrays.codes import AROUND_RIM, FRICTION_CALLS, STRETCH
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import V2, V3
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import add, cross, dot, scale, sub, vector
+from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
+from mbsim.dynamics.contact.forces import PRESSED_PART, contact_of
 from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT
 from mbsim.laws.abi import (
     ELASTIC,
     FORCE_X_OUT,
     FORCE_Y_OUT,
     FRICTION_INPUTS,
+    LIMIT_RATE,
     MEMORY_OUT,
     NFORCE_IN,
+    NORMAL_RATE,
     SIZE_OUT,
     STORED_OUT,
     TORQUE_X_OUT,
@@ -51,23 +58,31 @@ from mbsim.laws.abi import (
 
 #: Places on a rim.
 AROUND = 8
+TURN = 2.0 * math.pi
 #: Points of a rim that have a normal force.
 POINTS = 3
-#: Numbers of a law's memory that are a stretch, and all of it on a rim.
-STRETCH, KEPT = 2, 3
+#: Slip of this part of the speed of a fall by a radius is none.
+AT_REST = 1e-6
+#: Numbers that a law keeps all round a rim that integrates a stretch.
+KEPT = STRETCH + 1
 
 
 @jitable
 def first_of_rim(scene: Scene, s: int) -> int:
-    """Return the slot of the lowest point of the rim of slot s, -1 if not all of it is touched."""
+    """Return the slot of the lowest point of the rim of slot s, -1 if its pair has no rims."""
     pair = scene.slots.pair[s]
     if scene.kinds.rims[scene.pairs.kind[pair]] == 0:
         return -1
-    first = s - (s - scene.pairs.slot[pair]) % POINTS
+    return s - (s - scene.pairs.slot[pair]) % POINTS
+
+
+@jitable
+def is_touched(scene: Scene, first: int) -> bool:
+    """Return whether all points of a rim touch."""
     for k in range(first, first + POINTS):
         if scene.work.points[k, AT_DEPTH] <= 0.0:
-            return -1
-    return first
+            return False
+    return True
 
 
 @jitable
@@ -108,23 +123,29 @@ def levers(scene: Scene, s: int, first: int) -> tuple[V2, V2]:
 
 
 @jitable
+def add_number(scene: Scene, c: int, value: float) -> None:
+    """Add the number that a rim keeps to those that the law of contact c left in `law_out`."""
+    out, at = scene.work.law_out, MEMORY_OUT + scene.contacts.memory[c]
+    # rates follow behind
+    out[at + 1], out[at] = out[at], out[at - 1]
+    out[at - 1] = value
+
+
+@jitable
 def ask_point(scene: Scene, s: int, c: int) -> int:
     """Ask the friction law of contact c at the point of slot s; return its code."""
     contacts, work = scene.contacts, scene.work
     call = (contacts.id[c], work.law_in, contacts.friction_par[c], work.law_out)
     code = call_int(contacts.friction_law[c], call)
-    if contacts.memory[c] == KEPT:
-        # the law knows of two numbers
-        given, out = work.law_in, work.law_out
-        for k in range(STRETCH):
-            out[MEMORY_OUT + KEPT + 1 - k] = out[MEMORY_OUT + STRETCH + 1 - k]
-        out[MEMORY_OUT + STRETCH] = given[FRICTION_INPUTS + STRETCH]
-        out[MEMORY_OUT + KEPT + STRETCH] = 0.0
+    if contacts.memory[c] > 0:
+        add_number(scene, c, work.law_in[FRICTION_INPUTS + contacts.memory[c] - 1])
+        if contacts.carried[c] == KEPT:
+            work.law_out[MEMORY_OUT + KEPT + STRETCH] = 0.0
     return code
 
 
 @jitable
-def ask_over_rim(scene: Scene, s: int, c: int) -> int:  # noqa: C901
+def ask_over_rim(scene: Scene, s: int, c: int) -> int:
     """Ask the friction law of contact c for slot s, all over its rim where that is touched.
 
     `law_in` is filled for the point of slot s, and stays. Results are left in `law_out` as a law
@@ -133,7 +154,7 @@ def ask_over_rim(scene: Scene, s: int, c: int) -> int:  # noqa: C901
     """
     contacts, given, out = scene.contacts, scene.work.law_in, scene.work.law_out
     first = first_of_rim(scene, s)
-    if first < 0:
+    if first < 0 or not is_touched(scene, first):
         return ask_point(scene, s, c)
     off = eccentricity(scene, c, first)
     part = min(1.0, 2.0 * (1.0 - off))
@@ -167,7 +188,7 @@ def ask_over_rim(scene: Scene, s: int, c: int) -> int:  # noqa: C901
     call = (contacts.id[c], given, contacts.friction_par[c], out)
     scene.log.counters[FRICTION_CALLS] += AROUND - 1
     for k in range(AROUND):
-        angle = 2.0 * math.pi / AROUND * (k + 0.5)
+        angle = TURN / AROUND * (k + 0.5)
         a, b = math.cos(angle), math.sin(angle)
         # along the place's radius; its way round is (-b, a)
         a, b = a * ex - b * ey, a * ey + b * ex
@@ -196,3 +217,89 @@ def ask_over_rim(scene: Scene, s: int, c: int) -> int:  # noqa: C901
         out[at], out[at + 1], out[at + STRETCH] = zx, zy, twist
         out[at + KEPT], out[at + KEPT + 1], out[at + KEPT + STRETCH] = rate_x, rate_y, rate_twist
     return code
+
+
+@jitable
+def pace(scene: Scene, s: int, first: int) -> float:
+    """Return the angle from each point of a rim to the next in the incident marker of slot s."""
+    points = scene.work.points
+    low = vector(points[first, AT_POINT:])
+    ax, ay = in_frame(scene, s, sub(vector(points[first + 1, AT_POINT:]), low))
+    bx, by = in_frame(scene, s, sub(vector(points[first + 2, AT_POINT:]), low))
+    return math.copysign(TURN / POINTS, ax * by - ay * bx)
+
+
+@jitable
+def angle_of_place(scene: Scene, s: int, first: int, r: float, slip: V2) -> float:
+    """Return the angle of the place of slot s in its incident marker [rad].
+
+    It was chosen when the slot began to touch: 120 degrees from those of its rim that touched
+    before, else along the solid's slip at the middle of the rim, of radius r; where it does
+    not slip along gravity, which will make it.
+    """
+    state = scene.state
+    last = scene.contacts.memory[contact_of(scene, s)] - 1
+    if state.touching[s] == 1:
+        return scene.work.law_in[FRICTION_INPUTS + last]
+    for k in range(first, first + POINTS):
+        if state.touching[k] == 1:
+            n, tx, angle = vector(state.n[k]), vector(state.t[k]), state.memory[k, last]
+            ty = cross(n, tx)
+            x, y = in_frame(scene, s, add(scale(math.cos(angle), tx), scale(math.sin(angle), ty)))
+            return math.atan2(y, x) + pace(scene, s, first) * (s - k)
+    # of the solid on the plane, whichever of them is I
+    way = -1.0 if scene.kinds.swapped[scene.pairs.kind[scene.slots.pair[s]]] == 1 else 1.0
+    x, y = in_frame(scene, s, vector(scene.world.gravity))
+    size = norm(vector(scene.world.gravity))
+    falls = AT_REST * math.sqrt(r / size) if size > 0.0 else 0.0
+    return math.atan2(way * slip[1] + falls * y, way * slip[0] + falls * x) + pace(
+        scene, s, first
+    ) * (s - first)
+
+
+@jitable
+def ask_at_place(scene: Scene, s: int, c: int) -> int:
+    """Ask the friction law of contact c for slot s, at its place on the rim; return its code.
+
+    As `ask_over_rim`.
+    """
+    contacts, given, out = scene.contacts, scene.work.law_in, scene.work.law_out
+    first, times, qx, qy, angle = first_of_rim(scene, s), 1.0, 0.0, 0.0, 0.0
+    slip_x, slip_y, spin = given[XDOT_IN], given[XDOT_IN + 1], given[XDOT_IN + 2]
+    kept = (given[NFORCE_IN], given[NORMAL_RATE], given[LIMIT_RATE])
+    if first >= 0:
+        (px, py), (lx, ly) = levers(scene, s, first)
+        r = math.hypot(lx, ly)
+        angle = angle_of_place(scene, s, first, r, (slip_x + spin * py, slip_y - spin * px))
+        off = eccentricity(scene, c, first) if is_touched(scene, first) else 1.0
+        part = min(1.0, 2.0 * (1.0 - off))
+        if part > 0.0:
+            a, b = math.cos(angle), math.sin(angle)
+            # from the point to the place
+            qx, qy = part * (r * a - px), part * (r * b - py)
+            # of the mean of the three, what the pressure has at the place and at the point
+            there = 1.0 + 2.0 * min(off, 0.5) * (a * lx + b * ly) / r
+            here = 1.0 + 2.0 * off if s == first else 1.0 - off
+            times = part * there / here + 1.0 - part
+    given[XDOT_IN], given[XDOT_IN + 1] = slip_x - spin * qy, slip_y + spin * qx
+    given[NFORCE_IN], given[NORMAL_RATE], given[LIMIT_RATE] = (
+        times * kept[0],
+        times * kept[1],
+        times * kept[2],
+    )
+    call = (contacts.id[c], given, contacts.friction_par[c], out)
+    code = call_int(contacts.friction_law[c], call)
+    add_number(scene, c, angle)
+    given[XDOT_IN], given[XDOT_IN + 1] = slip_x, slip_y
+    given[NFORCE_IN], given[NORMAL_RATE], given[LIMIT_RATE] = kept
+    out[TORQUE_Z_OUT] += qx * out[FORCE_Y_OUT] - qy * out[FORCE_X_OUT]
+    scene.work.slot[s, PRESSED_PART] = times
+    return code
+
+
+@jitable
+def ask_on_rim(scene: Scene, s: int, c: int) -> int:
+    """Ask the friction law of contact c for slot s as it is asked on rims; return its code."""
+    if scene.contacts.rims[c] == AROUND_RIM:
+        return ask_over_rim(scene, s, c)
+    return ask_at_place(scene, s, c)

@@ -54,6 +54,7 @@ from mbsim.dynamics.contact.forces import (
     UNIT,
     contact_of,
     face_weight_of,
+    pressing,
 )
 from mbsim.dynamics.contact.memory import slipping_mass
 from mbsim.dynamics.expressions.jets import value
@@ -385,7 +386,7 @@ def hides(scene: Scene, t: float, y: F1, before: F1) -> bool:
                 return True
         if state.touching[s] == 0 or state.mode[s] % BRANCHES != STICK:
             continue
-        most = scene.audit.cone[c] * row[NORMAL]
+        most = scene.audit.cone[c] * pressing(scene, s)
         if scene.contacts.carried[c] == 0 or most == math.inf:
             continue
         stretch = math.hypot(y[z], y[z + 1])

@@ -6,7 +6,7 @@ import math
 
 from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
+from mbsim.core.rotation import add, cross, dot, scale, sub, vector
 from mbsim.geometry.catalog import axis, pair, put_point, region
 from mbsim.geometry.convex import point_in_solid
 from mbsim.geometry.region import cylinder_cut, frustum_ends
