@@ -44,10 +44,8 @@ from mbsim.laws.abi import (
     FORCE_X_OUT,
     FORCE_Y_OUT,
     FRICTION_INPUTS,
-    LIMIT_RATE,
     MEMORY_OUT,
     NFORCE_IN,
-    NORMAL_RATE,
     SIZE_OUT,
     STORED_OUT,
     TORQUE_X_OUT,
@@ -266,7 +264,7 @@ def ask_at_place(scene: Scene, s: int, c: int) -> int:
     contacts, given, out = scene.contacts, scene.work.law_in, scene.work.law_out
     first, times, qx, qy, angle = first_of_rim(scene, s), 1.0, 0.0, 0.0, 0.0
     slip_x, slip_y, spin = given[XDOT_IN], given[XDOT_IN + 1], given[XDOT_IN + 2]
-    kept = (given[NFORCE_IN], given[NORMAL_RATE], given[LIMIT_RATE])
+    normal = given[NFORCE_IN]
     if first >= 0:
         (px, py), (lx, ly) = levers(scene, s, first)
         r = math.hypot(lx, ly)
@@ -282,16 +280,13 @@ def ask_at_place(scene: Scene, s: int, c: int) -> int:
             here = 1.0 + 2.0 * off if s == first else 1.0 - off
             times = part * there / here + 1.0 - part
     given[XDOT_IN], given[XDOT_IN + 1] = slip_x - spin * qy, slip_y + spin * qx
-    given[NFORCE_IN], given[NORMAL_RATE], given[LIMIT_RATE] = (
-        times * kept[0],
-        times * kept[1],
-        times * kept[2],
-    )
+    # how fast that changes is found with it: `events.switching`
+    given[NFORCE_IN] = times * normal
     call = (contacts.id[c], given, contacts.friction_par[c], out)
     code = call_int(contacts.friction_law[c], call)
     add_number(scene, c, angle)
     given[XDOT_IN], given[XDOT_IN + 1] = slip_x, slip_y
-    given[NFORCE_IN], given[NORMAL_RATE], given[LIMIT_RATE] = kept
+    given[NFORCE_IN] = normal
     out[TORQUE_Z_OUT] += qx * out[FORCE_Y_OUT] - qy * out[FORCE_X_OUT]
     scene.work.slot[s, PRESSED_PART] = times
     return code

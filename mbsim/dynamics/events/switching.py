@@ -151,7 +151,7 @@ def decide(scene: Scene, context: int, t: float, y: F1) -> None:
         row = work.slot[s]
         if scene.state.touching[s] == 1 and row[BRANCH] == UNDECIDED:
             h, found = ahead_of(scene, s), True
-            row[FOUND_AT], row[NORMAL_THEN], row[LIMIT_THEN] = t, row[NORMAL], row[LIMIT]
+            row[FOUND_AT], row[NORMAL_THEN], row[LIMIT_THEN] = t, pressing(scene, s), row[LIMIT]
             row[FOUND_OVER], row[STIFFNESS_SLOPE] = h, math.nan
             # of a patch: it is not a function of the depth alone
             row[STIFFNESS_THEN] = row[STIFFNESS] if face_weight_of(scene, s) > 0.0 else math.nan
@@ -171,7 +171,7 @@ def decide(scene: Scene, context: int, t: float, y: F1) -> None:
             row = work.slot[s]
             if row[FOUND_AT] == t and row[FOUND_OVER] > ALIKE * h:
                 row[FOUND_OVER] = 0.0
-                row[NORMAL_SLOPE] = (row[NORMAL] - row[NORMAL_THEN]) / h
+                row[NORMAL_SLOPE] = (pressing(scene, s) - row[NORMAL_THEN]) / h
                 row[LIMIT_SLOPE] = (row[LIMIT] - row[LIMIT_THEN]) / h
                 row[STIFFNESS_SLOPE] = (row[STIFFNESS] - row[STIFFNESS_THEN]) / h
         h = longest_ahead(scene, t)
