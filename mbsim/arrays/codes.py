@@ -294,10 +294,14 @@ EVENT_TIME, EVENT_KIND, EVENT_ELEMENT, EVENT_SLOT = range(4)
 
 #: Rows of `Sweep.cone`: those of stiction.cones, and three of stiction.rigid_contact.
 CONE_ROWS = 12
-SLOT_COLUMNS = 31
+SLOT_COLUMNS = 32
 #: What `contact_set.put_aside` keeps of a slot, and twice the memory: frames, mode, point,
 #: `Work.slot`.
 SPARE = 24 + SLOT_COLUMNS
+#: How a friction law is asked on a rim (`contact.rims`): at its points, all round it, at a place
+#: for each point; and how many numbers of a law's memory are a stretch.
+AT_POINTS, AROUND_RIM, AT_PLACES = range(3)
+STRETCH = 2
 # columns of `Rows.contact`, of each contact; force and torque take three
 CONTACT_FORCE, CONTACT_TORQUE, CONTACT_DEPTH, CONTACT_SLIP = 0, 3, 6, 7
 CONTACT_INCIDENTS, CONTACT_AREA, CONTACT_COLUMNS = 8, 9, 10

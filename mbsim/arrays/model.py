@@ -46,6 +46,7 @@ class Kinds(NamedTuple):
     swapped: I1  # (nk,) 1 where the kernel's I is the contact's J
     regroups: I1  # (nk,) 1 where points may appear deep in a contact that goes on
     whole: F1  # (nk,) shares of a flat face, where incidents have an area; else 0
+    rims: I1  # (nk,) 1 where each three rows are of one rim: `contact.rims`
     step: I1  # (nk,) rows from one incident to the next: 1 for points, all where a pair is one
     moves: I1  # (nk,) 1 where a row is no part of a shape: incidents keep their slots by place
     noise: F1  # (nk,) scatter of the normals that its detector gives
@@ -70,6 +71,7 @@ class Contacts(NamedTuple):
     memory: I1  # (nc,) numbers that the friction law keeps
     carried: I1  # (nc,) how many of these are part of y
     spreads: I1  # (nc,) 1 where the law is asked all over a patch: `contact.spreading`
+    rims: I1  # (nc,) how the law is asked on a rim, AT_POINTS, ...: `contact.rims`
     numbers: F2  # (nc, ...) of the deck, but for the laws' own: see dynamics.contact.forces
     dmax: F1  # (nc,) 0 if not given
     reads_x: I1  # (nc,) 1 where an error of X counts

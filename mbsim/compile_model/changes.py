@@ -63,7 +63,9 @@ def parameters(system: System, changes: tuple[Change, ...]) -> Parameters:
     applied = rows.applied
     markers, angles = table.arrays()
     listed = [with_radii(contact, model.graphics) for contact in model.contacts.values()]
-    contacts, _ = contacts_table(listed, system.user_friction, system.user_normal)
+    kinds = scene.kinds
+    with_rims = {int(scene.contacts.id[c]) for c in kinds.contact[kinds.rims == 1]}
+    contacts, _ = contacts_table(listed, system.user_friction, system.user_normal, with_rims)
     same = all(
         np.array_equal(x, y)
         for x, y in ((markers.body, scene.markers.body), (markers.p, scene.markers.p))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mbsim.arrays import codes
+from mbsim.arrays.codes import AROUND_RIM, AT_PLACES, AT_POINTS, STRETCH
 from mbsim.arrays.model import Contacts, Graphics, Kinds, Slots
 from mbsim.arrays.state import Broadphase, Pairs
 from mbsim.compile_model.pairing import (
@@ -26,7 +27,7 @@ from mbsim.core import jit
 from mbsim.core.layout import BODY_SIZE
 from mbsim.geometry.catalog import NEARS, PAIRS, REGION_ROWS, REGIONS, SIZE, Pair
 from mbsim.laws import abi
-from mbsim.laws.catalog import NORMAL_LAWS, friction_law_of
+from mbsim.laws.catalog import NORMAL_LAWS, FrictionLaw, friction_law_of
 from mbsim.laws.constants import friction_parameters, normal_constants
 from mbsim.model.contact_radius import with_radii
 from mbsim.model.elements import Contact, Model
@@ -153,6 +154,7 @@ def kinds_table(kinds: list[Kind], contacts: dict[int, int]) -> Kinds:
         swapped=np.array([k.swapped for k in kinds], dtype=np.int64),
         regroups=np.array([k.regroups for k in kinds], dtype=np.int64),
         whole=np.array([_face_weight(k) for k in kinds]),
+        rims=np.array([k.rims for k in kinds], dtype=np.int64),
         step=np.array([k.step for k in kinds], dtype=np.int64),
         moves=np.array([k.moves for k in kinds], dtype=np.int64),
         noise=np.array([0.0 if k.closed_form else _noise(k) for k in kinds]),
@@ -269,15 +271,27 @@ def _full_damping_depth(contact: Contact) -> float:
     return _or(contact.dmax, 0.0) if read and contact.damping else 0.0
 
 
+def on_rims(law: FrictionLaw, with_function: bool) -> int:
+    """Return how a law is asked on a rim; `with_function`: a user's gives its sliding friction."""
+    if law.modes:
+        return AT_PLACES if law.carried == STRETCH and not with_function else AT_POINTS
+    around = not law.uses_x and law.memory == law.carried in (0, STRETCH)
+    return AROUND_RIM if around else AT_POINTS
+
+
 def contacts_table(
     contacts: list[Contact],
     user: dict[int, UserFriction],
     user_normal: Mapping[int, UserNormal],
+    with_rims: Set[int],
 ) -> tuple[Contacts, np.ndarray[Any, Any]]:
-    """Return the contacts, and for each whether X has to be carried."""
+    """Return the contacts, and for each whether X has to be carried.
+
+    `with_rims` has the ids of those that may touch with a rim.
+    """
     n = len(contacts)
     normal, friction, addresses, uses_x = [], [], [], np.zeros(n, dtype=bool)
-    memory, carried, spreads = (np.zeros(n, dtype=np.int64) for _ in range(3))
+    memory, carried, spreads, rims = (np.zeros(n, dtype=np.int64) for _ in range(4))
     for k, contact in enumerate(contacts):
         if contact.id in user_normal:
             own = user_normal[contact.id]
@@ -299,6 +313,11 @@ def contacts_table(
             uses_x[k], memory[k] = friction_law.uses_x, friction_law.memory
             carried[k] = friction_law.carried
             spreads[k] = not (memory[k] or uses_x[k] or friction_law.of_area)
+            if contact.id in with_rims:
+                rims[k] = on_rims(friction_law, contact.id in user)
+            if rims[k] and memory[k]:
+                memory[k] += 1
+                carried[k] += rims[k] == AROUND_RIM
 
     def table(rows: Sequence[np.ndarray[Any, Any]]) -> np.ndarray[Any, Any]:
         wide = np.zeros((n, max([1, *map(len, rows)])))
@@ -329,6 +348,7 @@ def contacts_table(
         memory=memory,
         carried=carried,
         spreads=spreads,
+        rims=rims,
         numbers=table([np.array(c.numbers) for c in contacts]),
         dmax=np.array([_full_damping_depth(c) for c in contacts], dtype=np.float64),
         reads_x=np.array(
@@ -411,7 +431,8 @@ def contact_tables(
         model, placement, list(graphic_row), body_row, shapes, needed_as_triangles(model, plans)
     )
     pairs, ns = pairs_table(plans, plans.kinds, graphic_row)
-    laws, uses_x = contacts_table(contacts, user, user_normal)
+    with_rims = {kind.contact for kind in plans.kinds if kind.rims}
+    laws, uses_x = contacts_table(contacts, user, user_normal, with_rims)
     first = BODY_SIZE * len(placement.bodies)
     slots, carried = slots_table(plans, pairs, laws, uses_x, contact_row, first)
     broadphase = broadphase_table(

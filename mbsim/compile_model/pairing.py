@@ -61,6 +61,11 @@ class Kind:
         return self.region or (bool(self.closed_form) and PAIRS[self.closed_form].patches)
 
     @property
+    def rims(self) -> bool:
+        """Whether each three of its rows are of one rim."""
+        return bool(self.closed_form) and not self.region and PAIRS[self.closed_form].rims
+
+    @property
     def moves(self) -> bool:
         """Whether its rows are no parts of a shape: incidents keep their slots by their places."""
         if not self.closed_form:

@@ -63,6 +63,8 @@ class Pair(NamedTuple):
     regroups: bool = False
     #: Whether its rows are patches: `REGION_ROWS` each, without points.
     patches: bool = False
+    #: Whether each three of its rows are of one rim, whose first is the lowest.
+    rims: bool = False
 
 
 class Region(NamedTuple):
@@ -80,13 +82,18 @@ REGIONS: Registry[Region] = Registry("mbsim.geometry.pairs")
 
 
 def pair(
-    shape_i: str, shape_j: str, slots: int, regroups: bool = False, patches: bool = False
+    shape_i: str,
+    shape_j: str,
+    slots: int,
+    regroups: bool = False,
+    patches: bool = False,
+    rims: bool = False,
 ) -> Callable[[Kernel], Kernel]:
     """Register the decorated function as the closed form of I = shape_i on J = shape_j."""
 
     def register(points: Kernel) -> Kernel:
         name = f"{shape_i}-{shape_j}"
-        PAIRS.put(name, Pair(name, jitable(points), slots, regroups, patches))
+        PAIRS.put(name, Pair(name, jitable(points), slots, regroups, patches, rims))
         return points
 
     return register

@@ -47,6 +47,7 @@ PARTS_OF_SCENE = {
     Hook.TILTING: "contacts",
     Hook.RECALL: "contacts",
     Hook.SPREAD: "contacts",
+    Hook.RIM: "contacts",
     Hook.HOLD_BACK: "contacts",
     Hook.VALUE: "forces",
     Hook.JET: "forces",

@@ -162,7 +162,15 @@ class Replay:
         # laws may ask for expressions, and for what they kept
         fill(
             scene,
-            only=(Hook.VALUE, Hook.ELEMENT, Hook.TILTING, Hook.RECALL, Hook.SPREAD, Hook.HOLD_BACK),
+            only=(
+                Hook.VALUE,
+                Hook.ELEMENT,
+                Hook.TILTING,
+                Hook.RECALL,
+                Hook.SPREAD,
+                Hook.RIM,
+                Hook.HOLD_BACK,
+            ),
         )
         if self.system.reader is not None:
             self.system.reader.open(scene)

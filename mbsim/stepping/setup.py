@@ -50,6 +50,7 @@ COMPLIANT = frozenset(
         Hook.TILTING,
         Hook.RECALL,
         Hook.SPREAD,
+        Hook.RIM,
         Hook.HOLD_BACK,
         Hook.STICKING,
         Hook.CONTACT_SLOPES,

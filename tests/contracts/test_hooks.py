@@ -11,7 +11,7 @@ from numba import types
 
 import mbsim
 from helpers import mechanism_decks, pile_decks
-from helpers.decks import write_deck
+from helpers.decks import COULOMB, GRAVITY, GROUND, contact, write_deck
 from helpers.folders import MODELS
 from helpers.mechanics import Body
 from helpers.surfaces import IMPACT, angle_on_ground
@@ -54,6 +54,7 @@ CASES = [
     (Hook.FCL, None, "bouncing_sphere", "DOPRI5"),
     (Hook.SLOTS, None, "angle", "DOPRI5"),
     (Hook.SPREAD, None, "angle", "DOPRI5"),
+    (Hook.RIM, None, "cylinder", "DOPRI5"),
     (Hook.TILTING, None, "contensou_disc", "DOPRI5"),
     *((Hook.RECALL, what, "lugre_stick_slip", "DOPRI5") for what in Recall),
     (Hook.VALUE, None, "dry_friction_element", "DOPRI5"),
@@ -101,6 +102,17 @@ def _pin():
     return mechanism_decks.Scene([body], [joint], extra=friction).xml()
 
 
+def _cylinder():
+    return (
+        GROUND
+        + '<Reference_Marker id="20" body_id="2"/>'
+        + '<Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="1" inertia_yy="1" inertia_zz="1"/>'
+        + '<Post_Graphic id="200" type="Cylinder" center_marker_id="20" radius="1" length="1"/>'
+        + contact(**COULOMB)
+        + GRAVITY
+    )
+
+
 def _contact_set():
     return pile_decks.pile(pile_decks.block(4, 0.25))
 
@@ -110,6 +122,7 @@ def model_of(deck, folder):
     made = {
         "pin": _pin,
         "broadphase": _contact_set,
+        "cylinder": _cylinder,
         "angle": lambda: angle_on_ground(0.0501, IMPACT),
     }
     path = write_deck(folder, made[deck]()) if deck in made else MODELS / f"{deck}.xml"

@@ -574,9 +574,10 @@ CONTACTS = (
 )
 BRANCHES = "mbsim.integrators.branches mbsim.integrators.events mbsim.dynamics.events.switching "
 #: Of contacts that a scene may lack: friction in steps of fixed length, pairs without a closed
-#: form, flat faces that are one incident.
+#: form, flat faces that are one incident, bodies that stand on a rim.
 OF_SOME_CONTACTS = (
-    "contact.fixed_step contact.fcl_points add_region_stiffness add_moves_of_centre "
+    "contact.fixed_step detection.bounding_gap detection.another_point contact.rims "
+    "add_region_stiffness add_moves_of_centre "
     "contact.tilting contact.spreading points.keep_slots points.exchange "
 )
 #: Of joints, forces, expressions; of friction with memory, and faces that are one incident.

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import (
+    AT_PLACES,
     FRICTION_CALLS,
     NOISE_FORCE,
     NOISE_TORQUE,
@@ -101,6 +102,8 @@ BRANCH, UNIT, ALONG_X, ALONG_Y, STIFFENS, LIMIT = range(17, 23)
 # it, else NaN
 NORMAL_SLOPE, LIMIT_SLOPE, FOUND_AT, NORMAL_THEN, LIMIT_THEN, FOUND_OVER = range(23, 29)
 STIFFNESS_SLOPE, STIFFNESS_THEN = 29, 30
+# the part of its normal force that rubs at its place on a rim (`contact.rims`)
+PRESSED_PART = 31
 
 # part by which k d/F has to be off 1 for a normal force's stiffness to change with its depth
 CHANGES = 1e-9
@@ -166,6 +169,14 @@ def is_patch(scene: Scene, s: int) -> bool:
 def patch(scene: Scene, s: int) -> float:
     """Return the area of contact of slot s, 0 for a point."""
     return scene.work.slot[s, PATCH] if face_weight_of(scene, s) > 0.0 else 0.0
+
+
+@jitable
+def pressing(scene: Scene, s: int) -> float:
+    """Return what presses where friction of slot s acts."""
+    row = scene.work.slot[s]
+    part = row[PRESSED_PART] if scene.contacts.rims[contact_of(scene, s)] == AT_PLACES else 1.0
+    return part * row[NORMAL]
 
 
 @jitable
@@ -235,6 +246,8 @@ def friction(
         given[SLIDING_LIMIT] = work.slot[s, LIMIT] = math.hypot(out[FORCE_X_OUT], out[FORCE_Y_OUT])
     if contacts.spreads[c] == 1 and is_patch(scene, s):
         return call_int(scene.world.hooks[Hook.SPREAD], (scene, s, c))
+    if contacts.rims[c] > 0:
+        return call_int(scene.world.hooks[Hook.RIM], (scene, s, c))
     call = (contacts.id[c], given, contacts.friction_par[c], out)
     return call_int(contacts.friction_law[c], call)
 

@@ -54,6 +54,7 @@ from mbsim.dynamics.contact.forces import (
     UNIT,
     contact_of,
     face_weight_of,
+    pressing,
 )
 from mbsim.dynamics.contact.memory import slipping_mass
 from mbsim.dynamics.expressions.jets import value
@@ -150,7 +151,7 @@ def decide(scene: Scene, context: int, t: float, y: F1) -> None:
         row = work.slot[s]
         if scene.state.touching[s] == 1 and row[BRANCH] == UNDECIDED:
             h, found = ahead_of(scene, s), True
-            row[FOUND_AT], row[NORMAL_THEN], row[LIMIT_THEN] = t, row[NORMAL], row[LIMIT]
+            row[FOUND_AT], row[NORMAL_THEN], row[LIMIT_THEN] = t, pressing(scene, s), row[LIMIT]
             row[FOUND_OVER], row[STIFFNESS_SLOPE] = h, math.nan
             # of a patch: it is not a function of the depth alone
             row[STIFFNESS_THEN] = row[STIFFNESS] if face_weight_of(scene, s) > 0.0 else math.nan
@@ -170,7 +171,7 @@ def decide(scene: Scene, context: int, t: float, y: F1) -> None:
             row = work.slot[s]
             if row[FOUND_AT] == t and row[FOUND_OVER] > ALIKE * h:
                 row[FOUND_OVER] = 0.0
-                row[NORMAL_SLOPE] = (row[NORMAL] - row[NORMAL_THEN]) / h
+                row[NORMAL_SLOPE] = (pressing(scene, s) - row[NORMAL_THEN]) / h
                 row[LIMIT_SLOPE] = (row[LIMIT] - row[LIMIT_THEN]) / h
                 row[STIFFNESS_SLOPE] = (row[STIFFNESS] - row[STIFFNESS_THEN]) / h
         h = longest_ahead(scene, t)
@@ -385,7 +386,7 @@ def hides(scene: Scene, t: float, y: F1, before: F1) -> bool:
                 return True
         if state.touching[s] == 0 or state.mode[s] % BRANCHES != STICK:
             continue
-        most = scene.audit.cone[c] * row[NORMAL]
+        most = scene.audit.cone[c] * pressing(scene, s)
         if scene.contacts.carried[c] == 0 or most == math.inf:
             continue
         stretch = math.hypot(y[z], y[z + 1])

@@ -87,7 +87,7 @@ from mbsim.dynamics.bodies.scales import fill_squares
 from mbsim.dynamics.constraints.equations import MISMATCH, RESIDUAL
 from mbsim.dynamics.constraints.folding import is_sticking
 from mbsim.dynamics.constraints.in_use import active_count, is_friction
-from mbsim.dynamics.contact.forces import FORCE, NORMAL, contact_of, sides
+from mbsim.dynamics.contact.forces import FORCE, NORMAL, contact_of, pressing, sides
 from mbsim.dynamics.pipeline.output import fill_energy
 from mbsim.geometry.catalog import AT_NORMAL
 
@@ -325,7 +325,7 @@ def examine_friction(scene: Scene, t: float) -> None:
         force, n = vector(work.slot[s, FORCE : FORCE + 3]), vector(work.points[s, AT_NORMAL:])
         normal = dot(force, n)
         tangential = norm(sub(force, scale(normal, n)))
-        most = audit.cone[c] * max(0.0, work.slot[s, NORMAL])
+        most = audit.cone[c] * max(0.0, pressing(scene, s))
         row = audit.contact[c]
         row[LARGEST_FRICTION] = max(row[LARGEST_FRICTION], most)
         if tangential > most + CONE_ROUNDING * abs(normal):

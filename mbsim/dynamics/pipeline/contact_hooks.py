@@ -17,13 +17,13 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.address import vector_at, view
 from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
-from mbsim.dynamics.contact.detection import find_contacts
-from mbsim.dynamics.contact.fcl_points import another_point, bounding_gap
+from mbsim.dynamics.contact.detection import another_point, bounding_gap, find_contacts
 from mbsim.dynamics.contact.fixed_step import hold_back
 from mbsim.dynamics.contact.forces import add_contact, contact_of
 from mbsim.dynamics.contact.memory import commit_memory, keep, remember
 from mbsim.dynamics.contact.peaks import watch_end, watch_inside
 from mbsim.dynamics.contact.points import commit_gaps, commit_incidents, keep_slots
+from mbsim.dynamics.contact.rims import ask_on_rim
 from mbsim.dynamics.contact.spreading import ask_over_patch
 from mbsim.dynamics.contact.tilting import damp_tilting
 from mbsim.dynamics.events.contact_stability import add_all_meeting, add_all_touching
@@ -107,6 +107,11 @@ def damp_contact(context: int, s: int, t: float, normal: float, a: Pointer) -> i
 def friction_of_patch(context: int, s: int, c: int) -> int:
     """What the friction law of contact c does all over the patch in slot s."""
     return ask_over_patch(view(context, Scene), s, c)
+
+
+def friction_of_rim(context: int, s: int, c: int) -> int:
+    """What the friction law of contact c does in slot s, whose pair may stand on a rim."""
+    return ask_on_rim(view(context, Scene), s, c)
 
 
 def recall_friction(context: int, what: int, s: int, t: float, a: Pointer, anew: int) -> int:

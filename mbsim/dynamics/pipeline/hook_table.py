@@ -78,6 +78,15 @@ def _of(module: str, name: str) -> Callable[[Scene], Callable[..., Any]]:
     return entry
 
 
+def _any(table: str, column: str) -> Callable[[Scene, Method], bool]:
+    """Return what says whether a column of a scene's table has any entry that is not 0."""
+
+    def when(scene: Scene, method: Method) -> bool:
+        return bool(np.any(getattr(getattr(scene, table), column)))
+
+    return when
+
+
 def _gauges(scene: Scene) -> Callable[..., Any]:
     from mbsim.dynamics.pipeline.contact_hooks import gauge_contacts, gauge_steps
 
@@ -87,14 +96,6 @@ def _gauges(scene: Scene) -> Callable[..., Any]:
 
 def _has_faces(scene: Scene, method: Method) -> bool:
     return bool((scene.kinds.whole > 0.0).any())
-
-
-def _has_patches(scene: Scene, method: Method) -> bool:
-    return bool(scene.kinds.moves.any())
-
-
-def _recalls(scene: Scene, method: Method) -> bool:
-    return bool((scene.contacts.memory > 0).any())
 
 
 def _spreads(scene: Scene, method: Method) -> bool:
@@ -169,10 +170,6 @@ def _joints(scene: Scene) -> Callable[..., Any]:
 
     settles = bool(scene.applied.with_reactions.any())
     return serve_joints if len(scene.equations.program) > 0 or settles else serve_tree
-
-
-def _has_sticking(scene: Scene, method: Method) -> bool:
-    return bool(scene.contacts.rigid.any())
 
 
 def _has_reaction_forces(scene: Scene, method: Method) -> bool:
@@ -271,7 +268,7 @@ TABLE = (
     Row(
         Hook.SLOTS,
         _INT(_INT, _INT),  # context, pair
-        _has_patches,
+        _any("kinds", "moves"),
         _of("pipeline.contact_hooks", "keep_slots_of"),
         "puts incidents that have no identity of their own into the slots that they had",
     ),
@@ -285,7 +282,7 @@ TABLE = (
     Row(
         Hook.RECALL,
         _INT(_INT, _INT, _INT, _T, _PTR, _INT),  # context, request, slot, t, y or y', 1 for anew
-        _recalls,
+        _any("contacts", "memory"),
         _of("pipeline.contact_hooks", "recall_friction"),
         "does what friction of contacts with memory is asked for: `Recall`",
         "an answer, or less a code",
@@ -296,6 +293,13 @@ TABLE = (
         _spreads,
         _of("pipeline.contact_hooks", "friction_of_patch"),
         "asks a friction law all over a patch",
+    ),
+    Row(
+        Hook.RIM,
+        _INT(_INT, _INT, _INT),  # context, slot, contact
+        _any("contacts", "rims"),
+        _of("pipeline.contact_hooks", "friction_of_rim"),
+        "asks a friction law all round the rim that a body stands on",
     ),
     Row(
         Hook.HOLD_BACK,
@@ -351,7 +355,7 @@ TABLE = (
     Row(
         Hook.STICKING,
         _KEEPS,
-        _has_sticking,
+        _any("contacts", "rigid"),
         _of("pipeline.force_hooks", "serve_sticking_contacts"),
         "does what contacts are asked for whose friction is rigid: `Sticking`",
         "an answer, or less a code",

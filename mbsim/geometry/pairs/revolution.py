@@ -6,7 +6,7 @@ import math
 
 from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
+from mbsim.core.rotation import add, cross, dot, scale, sub, vector
 from mbsim.geometry.catalog import axis, pair, put_point, region
 from mbsim.geometry.convex import point_in_solid
 from mbsim.geometry.region import cylinder_cut, frustum_ends
@@ -51,11 +51,13 @@ def solid_on_plane(frame_i: F1, size: V3, origin: V3, n: V3, points: F2) -> int:
     where an upright solid has no lowest point. Depths depend on height and tilt only,
     and so does the torque: the elastic force has a potential.
     """
-    centre = vector(frame_i)
-    a = axis(frame_i, 2)
-    down = sub(scale(dot(n, a), a), n)
-    length = norm(down)
-    down = scale(1.0 / length, down) if length > 1e-9 else axis(frame_i, 0)
+    centre, a, x, y = vector(frame_i), axis(frame_i, 2), axis(frame_i, 0), axis(frame_i, 1)
+    # along the solid's own axes, so that it is square to a however small the tilt
+    along_x, along_y = -dot(n, x), -dot(n, y)
+    tilt = math.hypot(along_x, along_y)
+    down = x
+    if tilt > 0.0:
+        down = add(scale(along_x / tilt, x), scale(along_y / tilt, y))
     side = cross(a, down)
     for rim in range(2):
         end = add(centre, scale((1.0 if rim else -1.0) * size[2], a))
@@ -69,14 +71,14 @@ def solid_on_plane(frame_i: F1, size: V3, origin: V3, n: V3, points: F2) -> int:
     return RIM_SLOTS
 
 
-@pair("CYLINDER", "PLANE", slots=RIM_SLOTS)
+@pair("CYLINDER", "PLANE", slots=RIM_SLOTS, rims=True)
 def cylinder_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """Three points of each rim against the plane."""
     n, origin = axis(frame_j, 2), vector(frame_j)
     return solid_on_plane(frame_i, cylinder_size(size_i), origin, n, points)
 
 
-@pair("FRUSTUM", "PLANE", slots=RIM_SLOTS)
+@pair("FRUSTUM", "PLANE", slots=RIM_SLOTS, rims=True)
 def frustum_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """Three points of each rim against the plane; the side lies on its two lowest points."""
     return solid_on_plane(frame_i, vector(size_i), vector(frame_j), axis(frame_j, 2), points)
