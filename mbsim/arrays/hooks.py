@@ -47,12 +47,13 @@ class Hook(IntEnum):
     GAUGES = 23  # what is measured of contacts: `Gauges`
     EFFECTS = 24  # what an error does to contacts, as implicit methods ask: `Effects`
     STABILITY = 25  # what contacts bound steps of fixed length by: `Stability`
-    FCL_POINTS = 26  # what follows from points that FCL found: `FclPoints`
-    DRY = 27  # what Force_DryFriction and Force_Element keep of a step: `Dry`
-    ANGLES = 28  # turns of followed angles
-    NEAR = 29  # the lists of near pairs
-    REQUESTS = 30  # expressions of requests
-    STEPPING = 31  # no hook: where the packed arrays of `stepping.arrays` are
+    PASSING = 26  # how long pairs of meshes that touch pass through no wall
+    FCL_POINTS = 27  # what follows from points that FCL found: `FclPoints`
+    DRY = 28  # what Force_DryFriction and Force_Element keep of a step: `Dry`
+    ANGLES = 29  # turns of followed angles
+    NEAR = 30  # the lists of near pairs
+    REQUESTS = 31  # expressions of requests
+    STEPPING = 32  # no hook: where the packed arrays of `stepping.arrays` are
 
 
 class Contacts(IntEnum):

@@ -57,6 +57,7 @@ COMPLIANT = frozenset(
         Hook.GAUGES,
         Hook.EFFECTS,
         Hook.STABILITY,
+        Hook.PASSING,
         Hook.FCL_POINTS,
     }
 )
