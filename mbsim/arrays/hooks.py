@@ -48,12 +48,13 @@ class Hook(IntEnum):
     GAUGES = 24  # what is measured of contacts: `Gauges`
     EFFECTS = 25  # what an error does to contacts, as implicit methods ask: `Effects`
     STABILITY = 26  # what contacts bound steps of fixed length by: `Stability`
-    FCL_POINTS = 27  # what follows from points that FCL found: `FclPoints`
-    DRY = 28  # what Force_DryFriction and Force_Element keep of a step: `Dry`
-    ANGLES = 29  # turns of followed angles
-    NEAR = 30  # the lists of near pairs
-    REQUESTS = 31  # expressions of requests
-    STEPPING = 32  # no hook: where the packed arrays of `stepping.arrays` are
+    PASSING = 27  # how long pairs of meshes that touch pass through no wall
+    FCL_POINTS = 28  # what follows from points that FCL found: `FclPoints`
+    DRY = 29  # what Force_DryFriction and Force_Element keep of a step: `Dry`
+    ANGLES = 30  # turns of followed angles
+    NEAR = 31  # the lists of near pairs
+    REQUESTS = 32  # expressions of requests
+    STEPPING = 33  # no hook: where the packed arrays of `stepping.arrays` are
 
 
 class Contacts(IntEnum):

@@ -21,6 +21,7 @@ class Work(NamedTuple):
     frames: F2  # (ng, 12)
     travel: F1  # (ng,) how far any point may have moved since the committed state
     speed: F2  # (ng, 2) of its fastest point, and acceleration of its centre
+    approach: F1  # (MOTION,) of a pair that touches, see geometry.motion
     points: F2  # (ns, POINT) candidates of geometry.catalog
     touching: I1  # (ns,)
     beyond: I1  # (nc,) 1 + the first pair whose overlap is deeper than its form knows; 0: none

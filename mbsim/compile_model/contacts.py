@@ -25,7 +25,7 @@ from mbsim.compile_model.pairing import (
 from mbsim.compile_model.surfaces import Need, needed_as_triangles, packed_surfaces, thickness
 from mbsim.core import jit
 from mbsim.core.layout import BODY_SIZE
-from mbsim.geometry.catalog import NEARS, PAIRS, REGION_ROWS, REGIONS, SIZE, Pair
+from mbsim.geometry.catalog import MOTION_BOUNDS, NEARS, PAIRS, REGION_ROWS, REGIONS, SIZE, Pair
 from mbsim.laws import abi
 from mbsim.laws.catalog import NORMAL_LAWS, FrictionLaw, friction_law_of
 from mbsim.laws.constants import friction_parameters, normal_constants
@@ -76,6 +76,16 @@ def near_address(name: str, rows: int) -> int:
     from mbsim.compile_model import pair_adapter
 
     adapted = pair_adapter.adapt_pair(NEARS[name], rows)
+    return jit.address(adapted, pair_adapter.SIGNATURE, allocates=True)
+
+
+def motion_bound_address(name: str) -> int:
+    """Return the address of the motion bound of a closed form, 0 where it has none."""
+    if name not in MOTION_BOUNDS:
+        return 0
+    from mbsim.compile_model import pair_adapter
+
+    adapted = pair_adapter.adapt_motion_bound(MOTION_BOUNDS[name])
     return jit.address(adapted, pair_adapter.SIGNATURE, allocates=True)
 
 
@@ -158,6 +168,7 @@ def kinds_table(kinds: list[Kind], contacts: dict[int, int]) -> Kinds:
         step=np.array([k.step for k in kinds], dtype=np.int64),
         moves=np.array([k.moves for k in kinds], dtype=np.int64),
         noise=np.array([0.0 if k.closed_form else _noise(k) for k in kinds]),
+        bound=np.array([motion_bound_address(k.closed_form) for k in kinds], dtype=np.int64),
         pressure=np.array(["FIELD" in k.closed_form.split("-") for k in kinds], dtype=np.int64),
     )
 

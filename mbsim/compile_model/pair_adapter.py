@@ -15,6 +15,7 @@ from numba import types
 from mbsim.core.address import table_at, vector_at
 from mbsim.core.arrays import Pointer
 from mbsim.geometry.catalog import POINT, REGION_ROWS, SIZE
+from mbsim.geometry.motion import MOTION
 from mbsim.geometry.region import sum_points
 
 _POINTER = types.CPointer(types.float64)
@@ -57,5 +58,23 @@ def adapt_region(region: Callable[..., tuple[int, float]], whole: float, slots: 
         count += REGION_ROWS
         sum_points(rows[:count], whole, area)
         return count
+
+    return entry
+
+
+@functools.cache
+def adapt_motion_bound(bound: Callable[..., int]) -> Any:
+    """Return a motion bound as a C function of plain pointers."""
+
+    def entry(
+        frame_i: Pointer, size_i: Pointer, frame_j: Pointer, size_j: Pointer, motion: Pointer
+    ) -> int:
+        return bound(
+            vector_at(frame_i, 12),
+            vector_at(size_i, SIZE),
+            vector_at(frame_j, 12),
+            vector_at(size_j, SIZE),
+            vector_at(motion, MOTION),
+        )
 
     return entry

@@ -12,6 +12,7 @@ from mbsim.arrays.model import Graphics, Residuals
 from mbsim.arrays.scratch import Rows, Work
 from mbsim.arrays.state import Log, State
 from mbsim.geometry.catalog import POINT
+from mbsim.geometry.motion import MOTION
 from mbsim.laws import abi
 
 #: Output rows before Python takes them: so many at least, and more where they are short.
@@ -129,6 +130,7 @@ def scratch(n: Sizes, graphics: Graphics) -> Work:
         noise=np.zeros((nb + 1, 2)),
         frames=np.full((ng, 12), np.nan),
         travel=np.full(ng, np.nan),
+        approach=np.full(MOTION, np.nan),
         speed=np.full((ng, 2), np.nan),
         points=np.zeros((ns, POINT)),
         touching=np.zeros(ns, dtype=np.int64),

@@ -25,7 +25,7 @@ does not know the depth of an overlap as deep as this one returns less the numbe
 
 A pair that meets in areas has also ``region(frame_i, size_i, frame_j, size_j, points) -> count,
 area``, which writes the same rows and returns beside their number the area of contact, seen along
-the normal; it is in a second registry.
+the normal; it is in a second registry. A third one has the motion bounds of pairs with meshes.
 """
 
 from __future__ import annotations
@@ -79,6 +79,7 @@ Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 PAIRS: Registry[Pair] = Registry("mbsim.geometry.pairs")
 NEARS: Registry[Callable[..., int]] = Registry("mbsim.geometry.pairs")
 REGIONS: Registry[Region] = Registry("mbsim.geometry.pairs")
+MOTION_BOUNDS: Registry[Callable[..., int]] = Registry("mbsim.geometry.pairs")
 
 
 def pair(
@@ -119,6 +120,20 @@ def near_pair(shape_i: str, shape_j: str) -> Callable[[Kernel], Kernel]:
     def register(points: Kernel) -> Kernel:
         NEARS.put(f"{shape_i}-{shape_j}", jitable(points))
         return points
+
+    return register
+
+
+def motion_bound(shape_i: str, shape_j: str) -> Callable[[Kernel], Kernel]:
+    """Register the decorated function as what tells how long a pair in touch passes no wall.
+
+    ``bound(frame_i, size_i, frame_j, size_j, motion)`` is given a motion (`geometry.motion`)
+    in the global frame, and writes the time over the one that is asked for.
+    """
+
+    def register(function: Kernel) -> Kernel:
+        MOTION_BOUNDS.put(f"{shape_i}-{shape_j}", jitable(function))
+        return function
 
     return register
 

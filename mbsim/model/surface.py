@@ -16,12 +16,13 @@ from mbsim.model.surface_tree import NOTHING, level_bounds, oriented_boxes, orie
 
 #: Numbers of the header: triangles, levels of the tree below its root, where boxes, triangles,
 #: marks, oriented boxes (`model.surface_tree`), the first triangles of leaves and those of shells
-#: (what hangs together through edges) begin, length of the whole. Behind the first triangles of
-#: shells stands the shell of each triangle.
-HEADER = 9
-(TRIANGLES, LEVELS, AT_BOXES, AT_TRIANGLES, AT_MARKS, AT_ORIENTED, AT_LEAVES, AT_SHELLS, LENGTH) = (
-    range(HEADER)
-)
+#: (what hangs together through edges) begin, length of the whole, its volume [L^3]. Behind the
+#: first triangles of shells stands the shell of each triangle.
+HEADER = 10
+(
+    TRIANGLES, LEVELS, AT_BOXES, AT_TRIANGLES, AT_MARKS, AT_ORIENTED, AT_LEAVES, AT_SHELLS,
+    LENGTH, SOLID,
+) = range(HEADER)  # fmt: skip
 #: Most triangles of a leaf.
 LEAF = 4
 #: Numbers of a node (from 1; those below node k are 2 k and 2 k + 1): centre and half edges of the
@@ -150,5 +151,7 @@ def pack(
     shells = np.concatenate([np.unique(shell, return_index=True)[1], shell])
     parts = [boxes.ravel(), table.ravel(), marks, oriented, starts, shells]
     at = HEADER + np.cumsum([0, *map(len, parts)])
-    packed: Array = np.concatenate([[count, levels, *at], *parts])
+    a, b, c = (corners - corners.mean(axis=(0, 1))).swapaxes(0, 1)
+    solid = float((np.cross(a, b) * c).sum()) / 6.0
+    packed: Array = np.concatenate([[count, levels, *at, solid], *parts])
     return packed

@@ -67,6 +67,7 @@ PARTS_OF_SCENE = {
     Hook.GAUGES: "step_control",
     Hook.EFFECTS: "step_control",
     Hook.STABILITY: "step_control",
+    Hook.PASSING: "step_control",
     Hook.FCL_POINTS: "detect",
     Hook.DRY: "forces",
     Hook.ANGLES: "step_control",

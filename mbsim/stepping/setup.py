@@ -60,6 +60,7 @@ COMPLIANT = frozenset(
         Hook.GAUGES,
         Hook.EFFECTS,
         Hook.STABILITY,
+        Hook.PASSING,
         Hook.FCL_POINTS,
     }
 )

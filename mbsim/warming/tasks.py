@@ -93,8 +93,13 @@ def _laws() -> Iterator[Task]:
 
 def _pairs() -> Iterator[Task]:
     """Yield the pairs of shapes that have closed forms."""
-    from mbsim.compile_model.contacts import near_address, pair_address, region_address
-    from mbsim.geometry.catalog import NEARS, PAIRS, REGIONS
+    from mbsim.compile_model.contacts import (
+        motion_bound_address,
+        near_address,
+        pair_address,
+        region_address,
+    )
+    from mbsim.geometry.catalog import MOTION_BOUNDS, NEARS, PAIRS, REGIONS
 
     for name in PAIRS:
         yield Task(name, functools.partial(pair_address, PAIRS[name]))
@@ -103,6 +108,8 @@ def _pairs() -> Iterator[Task]:
     for name in NEARS:
         rows = PAIRS[name].slots
         yield Task(f"{name} apart", functools.partial(near_address, name, rows))
+    for name in MOTION_BOUNDS:
+        yield Task(f"{name} motion bound", functools.partial(motion_bound_address, name))
 
 
 def _runs(files: Sequence[str] | Iterator[str], methods: Sequence[str]) -> Iterator[Task]:

@@ -46,11 +46,11 @@ def below(vertices, faces):
 
 @pytest.mark.parametrize("part", [0.05, 0.01])
 def test_volume_and_area_on_a_plane_are_those_of_the_clipped_polyhedron(part):
-    """An icosphere of 5120 triangles in 100 orientations, 1 km away."""
+    """An icosphere of 5120 triangles in 200 orientations, 1 km away."""
     vertices, faces = sphere(0.1, 4)
     mesh, rng = Meshed(vertices, faces, layered=False), np.random.default_rng(3)
     up, size = PLANE
-    for _ in range(100):
+    for _ in range(200):
         R = random_rotation(rng)
         p = np.array([1000.0, -300.0, 0.1 * (1.0 - part)])
         points = call("SURFACE-PLANE", frame(p, R), mesh.size, up, size)

@@ -9,17 +9,20 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import ACTIVE, AUDIT_TOL, CENTRE_ACCELERATION, FASTEST_POINT, SCALE_LENGTH
+from mbsim.arrays.hooks import Hook
 from mbsim.arrays.scene import Scene
-from mbsim.core.address import call_int
+from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import AT_V, AT_W, BODY_SIZE
+from mbsim.core.problem import STABLE_EVERY
 from mbsim.core.rotation import cross, dot, norm, sub, vector
-from mbsim.dynamics.bodies.kinematics import place_body, place_graphic
 from mbsim.dynamics.contact.detection import measure_pair
 from mbsim.dynamics.contact.forces import contact_of, sides, velocity_at
 from mbsim.dynamics.contact.points import deepest_of_impact, effective_mass
+from mbsim.dynamics.events.passing import deeper_at_once, place_side
 from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT
+from mbsim.geometry.motion import time_for
 from mbsim.laws.abi import ELASTIC, ENERGY, LOAD
 
 #: Halvings of the way out in which a force is looked for, and of where it ends.
@@ -40,9 +43,6 @@ BLIND_JUMP, AT_ONCE = 0.1, 1e-4
 SEEN = 0.6
 #: The end of a damper's ramp that is met within this part of a step is as good as at its begin.
 AT_BEGIN = 0.02
-#: How much deeper a step may lead, over half of the thickness of both shapes: `points.log_deep`
-#: looks at ends of steps, and sees what passes within 0.4 of it.
-DEEPER = 0.3
 #: Part of the scene's length below which a depth is rounding.
 ROUNDING = 1e-13
 
@@ -199,32 +199,16 @@ def longest_touching(scene: Scene, f: F1, h: float) -> float:
 
     What goes deeper does not leap through: ends of steps see that it is about to pass.
     """
-    state, longest, thin = scene.state, h, scene.graphics.thin
+    state, longest = scene.state, h
     for k in range(state.hit[len(state.hit) - 1]):
         s = state.hit[k]
         if state.rate[s] < 0.0:
             longest = min(longest, step_to_leave(scene, f, s, longest))
-        elif state.rate[s] > 0.0:
-            gi, gj = sides(scene, s)
-            longest = min(longest, DEEPER * (thin[gi] + thin[gj]) / state.rate[s])
+        else:
+            deeper, bend = deeper_at_once(scene, scene.slots.pair[s]), depth_bend(scene, f, s)
+            longest = min(longest, time_for(deeper, state.rate[s], max(0.0, bend)))
         longest = step_to_ramp(scene, f, s, longest)
     return longest
-
-
-@jitable
-def time_for(travel: float, speed: float, push: float) -> float:
-    """Return the time in which a shape can come `travel` far: way = speed h + push h^2 / 2."""
-    if speed == 0.0 and push == 0.0:
-        return math.inf
-    return 2.0 * travel / (speed + math.sqrt(speed * speed + 2.0 * push * travel))
-
-
-@jitable
-def place_side(scene: Scene, y: F1, g: int) -> None:
-    """Place graphic g and its body at y."""
-    if scene.graphics.body[g] < len(scene.bodies.mass):
-        place_body(scene, y, scene.graphics.body[g])
-        place_graphic(scene, y, g)
 
 
 @jitable
@@ -318,18 +302,29 @@ def longest_stay(scene: Scene, y: F1, f: F1) -> float:
 
 
 @jitable
+def longest_in_touch(scene: Scene, y: F1, f: F1, pair: int, h: float, longest: float) -> float:
+    """Return a step that no mesh in touch can use to pass through another place of the pair."""
+    asked = min(h, longest) if h > 0.0 else longest
+    passing = scene.world.hooks[Hook.PASSING]
+    return call_float(passing, (scene, pair, asked, y, f))
+
+
+@jitable
 def longest_travel(scene: Scene, y: F1, f: F1, h: float) -> float:
     """Return a step that no pair can use to pass through: gap plus thickness at closing speed.
 
-    A step of length h, the one intended, ends where a pair begins to touch.
+    A step of length h, the one intended, ends where a pair begins to touch; h is 0 for steps of
+    methods without error estimate.
     """
     pairs, graphics, work = scene.pairs, scene.graphics, scene.work
     longest = longest_stay(scene, y, f)
     for k in range(pairs.count[ACTIVE]):
         pair = pairs.active[k]
         i, j = pairs.graphic_i[pair], pairs.graphic_j[pair]
-        # in touch the stages feel the force, and sliding along is no approach
         if pairs.touches[pair] > 0:
+            # in touch the stages feel the force, and sliding along is no approach
+            if scene.kinds.bound[pairs.kind[pair]] != 0:
+                longest = min(longest, longest_in_touch(scene, y, f, pair, h, longest))
             continue
         left = max(pairs.left[pair], 0.0)
         speed = work.speed[i, FASTEST_POINT] + work.speed[j, FASTEST_POINT]
@@ -338,7 +333,11 @@ def longest_travel(scene: Scene, y: F1, f: F1, h: float) -> float:
         # half-space has swallowed it still pushes out, so nothing passes through a plane
         thin = 0.5 * min(graphics.thin[i], graphics.thin[j])
         if not (math.isinf(graphics.thin[i]) or math.isinf(graphics.thin[j])):
-            longest = min(longest, time_for(left + thin, speed, push))
+            seen = time_for(left + thin, speed, push)
+            if h == 0.0:
+                # as many steps as are taken until they are found anew, or each of them
+                seen = max(seen / STABLE_EVERY, time_for(thin, speed, push))
+            longest = min(longest, seen)
         if time_for(left, speed, push) < min(h, longest):
             longest = min(longest, step_to_touch(scene, y, f, pair, min(h, longest)))
     return longest

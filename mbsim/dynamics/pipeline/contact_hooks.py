@@ -28,6 +28,7 @@ from mbsim.dynamics.contact.spreading import ask_over_patch
 from mbsim.dynamics.contact.tilting import damp_tilting
 from mbsim.dynamics.events.contact_stability import add_all_meeting, add_all_touching
 from mbsim.dynamics.events.effects import friction_left, impact_left, pressure_left
+from mbsim.dynamics.events.passing import passing_time
 from mbsim.dynamics.events.step_limits import longest_step
 from mbsim.dynamics.pipeline.audit import (
     examine_friction,
@@ -141,6 +142,13 @@ def serve_fcl_points(context: int, what: int, index: int, h: float, a: Pointer) 
         return bounding_gap(scene, index)
     moved = another_point(scene, vector_at(a, scene.rows.y.shape[1]), h, index)
     return 1.0 if moved else 0.0
+
+
+def bound_passing(context: int, pair: int, asked: float, a: Pointer, b: Pointer) -> float:
+    """How long a pair that touches passes no wall; `a` and `b` are y and y'."""
+    scene = view(context, Scene)
+    n = scene.rows.y.shape[1]
+    return passing_time(scene, vector_at(a, n), vector_at(b, n), pair, asked)
 
 
 def gauge_steps(context: int, what: int, t: float, h: float, a: Pointer, b: Pointer) -> float:

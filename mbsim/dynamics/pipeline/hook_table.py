@@ -156,10 +156,6 @@ def _wrench(scene: Scene) -> Callable[..., Any]:
     return of.act_by_vector_force
 
 
-def _has_elements(scene: Scene, method: Method) -> bool:
-    return len(scene.residuals.id) > 0
-
-
 def _has_joints(scene: Scene, method: Method) -> bool:
     return len(scene.tree.body) > 0
 
@@ -341,7 +337,7 @@ TABLE = (
     Row(
         Hook.ELEMENT,
         _INT(_INT, _T, _PTR, _INT, _INT),  # context, t, y, element, component
-        _has_elements,
+        lambda scene, method: len(scene.residuals.id) > 0,
         _of("pipeline.force_hooks", "serve_element"),
         "solves a Force_Element for what expressions ask of it",
     ),
@@ -442,6 +438,14 @@ TABLE = (
         _of("pipeline.contact_hooks", "bound_contacts"),
         "bounds steps of a method without error estimate: `Stability`",
         "a step or 0; laws are explored, so that it does not fail",
+    ),
+    Row(
+        Hook.PASSING,
+        _T(_INT, _INT, _T, _PTR, _PTR),  # context, pair, the time asked for, y, y'
+        lambda scene, method: bool(scene.kinds.bound.any()),
+        _of("pipeline.contact_hooks", "bound_passing"),
+        "finds how long a pair of a mesh that touches passes through no wall",
+        "a time; it cannot fail",
     ),
     Row(
         Hook.FCL_POINTS,

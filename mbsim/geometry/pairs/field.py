@@ -9,7 +9,7 @@ import numpy as np
 
 from mbsim.core.arrays import F1, F2
 from mbsim.core.rotation import add, dot, scale, sub, vector
-from mbsim.geometry.catalog import AT_DEPTH, AT_POINT, REGION_ROWS, axis, pair
+from mbsim.geometry.catalog import AT_DEPTH, AT_POINT, REGION_ROWS, axis, motion_bound, pair
 from mbsim.geometry.mesh.field import write_patches
 from mbsim.geometry.mesh.overlap import (
     box_gap,
@@ -21,8 +21,10 @@ from mbsim.geometry.mesh.plane import lowest_corner, pieces_below, triangles_bel
 from mbsim.geometry.mesh.record import BEYOND
 from mbsim.geometry.pairs.surface import (
     PATCH_SLOTS,
+    all_in,
     far_apart,
     pose_of,
+    surface_bound,
     surface_of,
     swallowed,
     without_pieces,
@@ -68,10 +70,14 @@ def field_field(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) ->
         return without_pieces(mesh_i, mesh_j, pose, frame_j, points)
     partners = partners_of(mesh_i, mesh_j, count, values, pairs)
     at = add(vector(frame_j), to_global(frame_j, origin))
-    known = -1 if swallowed(mesh_i, mesh_j, pairs[:count], pose) else 1
+    inside = all_in(mesh_i, mesh_j, nodes[:count])
+    known = -1 if inside or swallowed(mesh_i, mesh_j, pairs[:count], pose) else 1
     for k in range(count):
         # what is below the layer does not press: forces keep their potential, and are too small
         if nodes[k, BEYOND] > 0.0:
             known = -1
     write_patches(nodes[:count], partners, frame_j, at, points)
     return known * len(points)
+
+
+motion_bound("FIELD", "FIELD")(surface_bound)

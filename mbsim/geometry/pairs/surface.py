@@ -11,7 +11,15 @@ from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
 from mbsim.core.rotation import add, dot, norm, scale, sub, vector
-from mbsim.geometry.catalog import AT_POINT, AT_WEIGHT, REGION_ROWS, axis, pair, put_point
+from mbsim.geometry.catalog import (
+    AT_POINT,
+    AT_WEIGHT,
+    REGION_ROWS,
+    axis,
+    motion_bound,
+    pair,
+    put_point,
+)
 from mbsim.geometry.mesh.ball import (
     NEAR_NORMAL,
     NEAR_NUMBERS,
@@ -35,6 +43,7 @@ from mbsim.geometry.mesh.merging import (
     strongest,
     write_points,
 )
+from mbsim.geometry.mesh.motion import ball_time, mesh_time
 from mbsim.geometry.mesh.oriented import place, place_back
 from mbsim.geometry.mesh.overlap import (
     box_gap,
@@ -43,8 +52,9 @@ from mbsim.geometry.mesh.overlap import (
     partners_of,
 )
 from mbsim.geometry.mesh.plane import lowest_corner, pieces_below, triangles_below
-from mbsim.geometry.mesh.record import BEYOND, PEAK
+from mbsim.geometry.mesh.record import BEYOND, PEAK, VOLUME
 from mbsim.geometry.mesh.tree import box_square
+from mbsim.geometry.motion import ACCELERATION, ASKED, SPIN, VELOCITY
 from mbsim.geometry.polyhedron import to_global
 from mbsim.model.surface import (
     AT_BOXES,
@@ -54,6 +64,7 @@ from mbsim.model.surface import (
     HEADER,
     LENGTH,
     NODE,
+    SOLID,
     TRIANGLE,
     TRIANGLES,
 )
@@ -61,6 +72,8 @@ from mbsim.model.surface import (
 PATCH_SLOTS = MOST_PEAKS * REGION_ROWS
 #: A peak with this part of its depth at the inner end of a layer may be deeper.
 AT_END = 0.9
+#: Part of a mesh's volume in another mesh from which all of it is.
+ALL = 0.999
 
 
 @jitable
@@ -158,6 +171,15 @@ def shell_within(mesh: F1, side: int, pairs: F2, other: F1, pose: F1) -> bool:
 
 
 @jitable
+def all_in(mesh_i: F1, mesh_j: F1, nodes: F2) -> bool:
+    """Return whether the overlap of two meshes has the volume of the smaller one."""
+    volume = 0.0
+    for k in range(len(nodes)):
+        volume += nodes[k, VOLUME]
+    return volume > ALL * min(mesh_i[SOLID], mesh_j[SOLID])
+
+
+@jitable
 def swallowed(mesh_i: F1, mesh_j: F1, pairs: F2, pose: F1) -> bool:
     """Return whether a shell of one of two meshes lies in the core of the other one."""
     return shell_within(mesh_i, 0, pairs, mesh_j, pose) or shell_within(
@@ -190,11 +212,11 @@ def surface_surface(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2
     count, nodes, values, pairs = nodes_of(mesh_i, mesh_j, pose, origin)
     if count == 0:
         return without_pieces(mesh_i, mesh_j, pose, frame_j, points)
-    pairs = pairs[:count]
+    pairs, inside = pairs[:count], all_in(mesh_i, mesh_j, nodes[:count])
     partners = partners_of(mesh_i, mesh_j, count, values, pairs)
     peaks = np.empty((count, PEAK_NUMBERS))
     count = merge(nodes[:count], values[:count], partners, peaks)
-    known = -1 if swallowed(mesh_i, mesh_j, pairs, pose) else 1
+    known = -1 if inside or swallowed(mesh_i, mesh_j, pairs, pose) else 1
     for k in range(count):
         patch = nodes[int(peaks[k, AT_NODE])]
         if patch[BEYOND] > AT_END * patch[PEAK]:
@@ -203,6 +225,33 @@ def surface_surface(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2
     at = add(vector(frame_j), to_global(frame_j, origin))
     write_points(peaks, count, frame_j, at, points)
     return known * len(points)
+
+
+@jitable
+def turned_motion(motion: F1, frame_j: F1) -> F1:
+    """Return a motion in J's axes."""
+    turned = motion.copy()
+    for at in (VELOCITY, ACCELERATION, SPIN):
+        for k in range(3):
+            turned[at + k] = dot(axis(frame_j, k), vector(motion, at))
+    return turned
+
+
+@motion_bound("SURFACE", "SURFACE")
+def surface_bound(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, motion: F1) -> int:
+    """Two meshes."""
+    turned, pose = turned_motion(motion, frame_j), pose_of(frame_i, frame_j)
+    motion[ASKED] = mesh_time(turned, surface_of(size_i), surface_of(size_j), pose)
+    return 0
+
+
+@motion_bound("SPHERE", "SURFACE")
+def sphere_bound(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, motion: F1) -> int:
+    """A ball, which does not pass a mesh by turning."""
+    apart = sub(vector(frame_i), vector(frame_j))
+    c = (dot(apart, axis(frame_j, 0)), dot(apart, axis(frame_j, 1)), dot(apart, axis(frame_j, 2)))
+    motion[ASKED] = ball_time(turned_motion(motion, frame_j), c, size_i[0], surface_of(size_j))
+    return 0
 
 
 @pair("SPHERE", "SURFACE", slots=MOST_PEAKS, regroups=True)
