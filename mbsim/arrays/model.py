@@ -275,6 +275,7 @@ class Equations(NamedTuple):
     unit: F1  # (ne,) what a residual is measured by: L, or 1 for angles
     connection: I1  # (ne,) the element that it belongs to
     dry: I1  # (ne,) row of `Applied` that it holds while that sticks, -1 for any other
+    off: I1  # (ne,) 1 while its element takes no part
     slot: I1  # (ne,) slot that it holds along x or y while that sticks, -1 for any other
     kind: I1  # (terms,)
     i: I1  # (terms,) markers

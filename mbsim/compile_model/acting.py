@@ -11,11 +11,13 @@ from mbsim.compile_model.applied import applied_forces
 from mbsim.compile_model.force_elements import STATEMENT
 from mbsim.compile_model.force_order import check_states, in_order
 from mbsim.compile_model.gravity import Pull, pulls
+from mbsim.compile_model.instructions import Instruction
 from mbsim.compile_model.markers import MarkerTable, body_rows
 from mbsim.compile_model.mechanism import Mechanism, RigidSlot, constrain
 from mbsim.compile_model.programs import ProgramTable
 from mbsim.compile_model.states import sensors_table, states_table
 from mbsim.compile_model.switching import switching_table
+from mbsim.expressions.elementary import NUMBER
 from mbsim.model.elements import Model
 from mbsim.model.forces import rigid_forces
 from mbsim.model.placement import place
@@ -71,6 +73,7 @@ class Acting:
     pulls: list[Pull]
     values: list[tuple[int, int]]
     residuals: Residuals | None
+    nothing: int  # program that is 0, -1 where nothing is ever switched off
 
 
 def _link_rigid(
@@ -129,6 +132,10 @@ def acting(
 
         table_of_residuals, states = residuals_table(model, table, programs, residuals, states)
         modes = mode_programs(model, programs, residuals)
+    nothing = -1
+    if any(simulation.inactive for simulation in model.simulations):
+        nothing = len(programs.programs)
+        programs.programs.append([Instruction(NUMBER, value=0.0)])
     held = (mechanism.connections, mechanism.elements, programs)
     check_states(model, states, applied, applied_ids, *held)
     return Acting(
@@ -143,6 +150,7 @@ def acting(
         pulls(model, programs),
         _values(model, programs, residuals),  # the last of all
         table_of_residuals,
+        nothing,
     )
 
 

@@ -80,6 +80,7 @@ class System:
     posts: list[ContactPost] = field(default_factory=list)  # the users' CONTACTPOSTs
     load: float = 0.0  # a usual force, by which friction is judged
     residuals: dict[int, UserResidual] = field(default_factory=dict)  # by Force_Element
+    nothing: int = -1  # program that is 0, where elements are switched off
 
     def unknowns(self) -> Iterator[tuple[str, int]]:
         """Yield the place in a result file of every unknown of elements, and its column."""
@@ -423,4 +424,5 @@ def build(
         code.posts,
         load=judged.load,
         residuals=code.residuals,
+        nothing=acts.nothing,
     )

@@ -69,6 +69,7 @@ class Sums:
             unit=np.array(self.unit, dtype=np.float64),
             connection=ints(self.connection),
             dry=ints(self.dry),
+            off=np.zeros(n, dtype=np.int64),
             slot=ints(self.slot),
             kind=ints(t[0] for t in self.terms),
             i=ints(t[1] for t in self.terms),

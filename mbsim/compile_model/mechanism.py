@@ -51,6 +51,7 @@ _LEAST_ROWS = 3
 _PARALLEL = 1e-6
 #: Cosine of half the bend of shafts that are folded back: no twist can be told from it.
 _FOLDED = 1e-8
+_TABLES = {"JOINT": "joints", "JPRIM": "primitives"}
 _LEVELS = {"A": 0, "V": 1, "D": 2}
 #: What a motion's direction means.
 _DIRECTIONS = {
@@ -99,6 +100,8 @@ class _Builder:
         self.pairs: list[tuple[int, int]] = []
         self.tree_joints: dict[int, TreeJoint] = {}
         self.joints: dict[int, Joint] = {}
+        #: What takes no part for a while: the tree does not change, so that it holds none of it.
+        self.switched = {one for each in model.simulations for one in each.inactive}
 
     def row_value(self, row: Row, i: int, j: int) -> float:
         """Return what a row is at the start."""
@@ -174,7 +177,8 @@ class _Builder:
         tree_joint = tree_joint_of(connection, i, j, JOINTS[joint.type].equations)
         if tree_joint is not None and tree_joint.turn == codes.TURN_CROSS:
             self.check_cross(statement, joint, tree_joint)
-        if tree_joint is not None and tree_joint.held >= _LEAST_ROWS:
+        lasts = (_TABLES[statement], joint.id) not in self.switched
+        if tree_joint is not None and tree_joint.held >= _LEAST_ROWS and lasts:
             self.tree_joints[connection] = tree_joint
 
     def check_cross(self, statement: str, joint: Joint, tree_joint: TreeJoint) -> None:

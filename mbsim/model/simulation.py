@@ -54,5 +54,7 @@ class Simulation:
     gravity: Gravity | None = None  # a Force_Gravity that stood before it in <Command>
     static: Static = Static()
     changes: tuple[Change, ...] = ()  # all that stood before it in <Command>
+    # elements that take no part, by what `Model.table` or `Model` calls their table, and by id
+    inactive: tuple[tuple[str, int], ...] = ()
     later: bool = False  # STATIC after another of the same statement, at its own start_time
     source: Source = Source()

@@ -26,6 +26,7 @@ _NAMED_BY = {
     "joint": ("Constraint_Joint",),
     "array": ("Reference_Array",),
     "matrix": ("Reference_Matrix",),
+    "evaluate": ("Sensor_Evaluate",),
 }
 _AXES = "xyz"
 _SQUARES = ("xx", "yy", "zz", "xy", "yz", "xz")

@@ -6,6 +6,7 @@ from dataclasses import fields, replace
 
 from mbsim.expressions import Expression
 from mbsim.model import elements as el
+from mbsim.reader.activity import check_joints
 from mbsim.reader.keywords import ANALYSIS_NOT_BUILT, ANALYSIS_TYPES, spellings
 from mbsim.reader.kinds import (
     COUNT,
@@ -135,6 +136,7 @@ def _at_once(entry: Entry, kind: str, time: float, later: bool = False) -> el.Si
         draft.command_gravity,
         draft.static,
         draft.changes,
+        tuple(sorted(draft.inactive)),
         later,
         entry.source,
     )
@@ -174,6 +176,7 @@ def _build_static(entry: Entry) -> None:
 def _build_simulate(entry: Entry) -> None:
     """Add one simulation."""
     draft = entry.draft
+    check_joints(draft)
     if not entry.given("analysis_type"):
         entry.note("not given; taken as TRANSIENT", "analysis_type")
     kind = entry.get("analysis_type")
@@ -195,6 +198,7 @@ def _build_simulate(entry: Entry) -> None:
         transient=draft.command_transient,
         gravity=draft.command_gravity,
         changes=draft.changes,
+        inactive=tuple(sorted(draft.inactive)),
         source=entry.source,
     )
     draft.simulations.append(simulation)

@@ -61,6 +61,10 @@ class Draft:
     command_transient: el.Transient | None = None
     stop_line: int = 0
     changes: tuple[el.Change, ...] = ()
+    # elements that take no part, by table and id, with the statement that says so
+    inactive: dict[tuple[str, int], tuple[el.Source, str]] = field(default_factory=dict)
+    # (joint, id of what needs it) that have been told of
+    joints_missed: set[tuple[int, int]] = field(default_factory=set)
     # statements of <Model> that may be changed, by name and id as written, as last changed
     nodes: dict[tuple[str, str], Node] = field(default_factory=dict)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mbsim.reader.activity import ACTIVATE, DEACTIVATE
 from mbsim.reader.bodies import BODY_RIGID, PARAM_UNIT, REFERENCE_MARKER
 from mbsim.reader.changes import CHANGEABLE, change
 from mbsim.reader.command import FORCE_GRAVITY, PARAM_STATIC, PARAM_TRANSIENT, SIMULATE, STOP
@@ -59,6 +60,8 @@ STATEMENTS = (
     SENSOR_EVENT,
     SENSOR_EVALUATE,
     POST_REQUEST,
+    ACTIVATE,
+    DEACTIVATE,
     SIMULATE,
     STOP,
     *OUTPUT_STATEMENTS,
@@ -68,10 +71,10 @@ BY_KEY = {fold(statement.name): statement for statement in STATEMENTS}
 # documented statements (or members of documented families) that would change the motion; those
 # that have been built are none of them
 _DOCUMENTED = (
-    "Activate Body_Flexible Body_Point Constraint_CVCV Constraint_Gear "
+    "Body_Flexible Body_Point Constraint_CVCV Constraint_Gear "
     "Constraint_PTCV Constraint_PTdCV "
     "Constraint_PTSF Constraint_UserConstr Control_FMU Control_PlantInput "
-    "Control_PlantOutput Control_SISO Control_StateEqn Deactivate "
+    "Control_PlantOutput Control_SISO Control_StateEqn "
     "Force_Beam Force_Field Force_MultiPoint Force_Penalty "
     "Force_StateEqn Force_TwoBody "
     "Param_Linear "
@@ -89,7 +92,7 @@ REFUSED = {
     "Save": "the result file keeps the state; a run cut short goes on with mbsim run --resume",
 }
 _REFUSED = {fold(name): f"{name} is not taken: {why}" for name, why in REFUSED.items()}
-_NOT_AFTER_STOP = (SIMULATE, PARAM_TRANSIENT, PARAM_STATIC, FORCE_GRAVITY)
+_NOT_AFTER_STOP = (ACTIVATE, DEACTIVATE, SIMULATE, PARAM_TRANSIENT, PARAM_STATIC, FORCE_GRAVITY)
 _NOT_BUILT = {fold(name): name for name in NOT_BUILT}
 
 

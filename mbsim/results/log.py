@@ -14,6 +14,7 @@ from mbsim.errors import ResultsError
 from mbsim.laws.catalog import NORMAL_LAWS, friction_law_of
 from mbsim.model.elements import Contact, Model
 from mbsim.model.names import element_name, statement_name
+from mbsim.reader.activity import statement_of
 from mbsim.results.audit import Audit
 from mbsim.results.elements import APPLIED, CONSTRAINTS, GROUPS, elements_of, equations
 from mbsim.results.elements import title as title_of
@@ -363,7 +364,8 @@ def _energy_lines(system: System, watch: Watch) -> Iterator[str]:
         said = {"dissipated": "dissipated total"}.get(name, name.replace("_", " "))
         yield fact(said, number(float(amount)))
     stages = system.model.simulations
-    if any(s.gravity is not None for s in stages[1:]) or any(s.changes for s in stages):
+    changed = any(s.changes or s.inactive for s in stages)
+    if changed or any(s.gravity is not None for s in stages[1:]):
         return  # with another gravity or spring goes another potential energy
     what = "kinetic + potential + dissipated"
     if len(names) == len(watch.last):
@@ -397,11 +399,16 @@ def _audit_lines(audit: Audit) -> Iterator[str]:
 def sequence(model: Model) -> Iterator[str]:
     """Yield what a deck's commands do, where that is more than one transient."""
     if [s.analysis_type for s in model.simulations] in ([], ["TRANSIENT"]) and not any(
-        s.changes for s in model.simulations
+        s.changes or s.inactive for s in model.simulations
     ):
         return
-    said = 0
+    said, before = 0, set[tuple[str, int]]()
     for simulation in model.simulations:
+        now = {*simulation.inactive}
+        for table, id in sorted(now ^ before):
+            name = element_name(model.file, statement_of(table, model.motions.get(id)), id)
+            yield f"{'deactivate' if (table, id) in now else 'activate'} {name}"
+        before = now
         for change in simulation.changes[said:]:
             yield f"change {change.text}"
         said = len(simulation.changes)

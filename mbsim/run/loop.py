@@ -18,6 +18,7 @@ import numpy as np
 from mbsim.core import profile
 from mbsim.errors import Interrupted, ModelError
 from mbsim.run import checkpoint, statistics
+from mbsim.run.commands import Commands
 from mbsim.run.divergence import Pace, next_budget
 from mbsim.run.failures import fail, give_up
 from mbsim.run.hook_calls import HookCalls, make_detector
@@ -74,7 +75,7 @@ class Runner:
         self.method, self.problem = self.methods.arrays, self.methods.problem
         self.hooks = HookCalls(system, self.problem, self.detector)
         self.method.counts[scheme.NEXT_WATCH] = 0
-        self.changes = changes or []  # parameters of every Simulate, where some differ
+        self.commands = Commands(system, settings, changes or [])
         self.stage = 0  # which Simulate
         self.pace = Pace(start, start)  # of that one
         self.sensing = Sensing(system, self.method, log, tell)
@@ -104,6 +105,8 @@ class Runner:
 
         t, method, log = self._first_time(), self.method, self.log.line
         with profile.part("start"):
+            if self.commands.activity is not None:
+                self.commands.activity.apply(self.settings.stages[0].simulation.inactive)
             assemble_model(self.system, self.hooks, t, method.y, log, self.tell)
             given = method.y, method.k[0], allow_overlap, log, self.tell
             settle_contacts(self.system, self.hooks, self.settings, *given)
@@ -117,36 +120,10 @@ class Runner:
         self.log.line(line)
         self.tell(line)
 
-    def _change(self) -> None:
-        """Let the elements be as the commands before this stage leave them, and say so once."""
-        if not self.changes:
-            return
-        from mbsim.compile_model.changes import apply
-
-        apply(self.system.scene, self.changes[self.stage])
-        self.methods.time_scene()
-        if self.system.reader is not None:
-            self.system.reader.open(self.system.scene)
-        before = self.settings.stages[self.stage - 1].simulation.changes if self.stage else ()
-        simulation = self.settings.stages[self.stage].simulation
-        for change in simulation.changes[len(before) :]:
-            self.log.line(f"from time {simulation.start_time:.9g} on {change.text}")
-
     def _keeps_end(self) -> bool:
         """Return whether the row at the end is this stage's: the last's, or one rest of several."""
         rest = [stage.is_static for stage in self.settings.stages[self.stage : self.stage + 2]]
         return len(rest) == 1 or all(rest)
-
-    def _interrupts(self, stage: int) -> bool:
-        """Return whether motions may not go on as they were: after a rest, and when changed.
-
-        A model is assembled as it is written, before what changes it ahead of its first Simulate.
-        """
-        before = self.settings.stages[max(0, stage - 1) : stage]
-        known = sum(len(one.simulation.changes) for one in before)
-        fresh = self.settings.stages[stage].simulation.changes[known:]
-        rested = any(one.is_static for one in before)
-        return rested or any(c.table in ("motions", "variables") for c in fresh)
 
     def dump_every(self, every: int, resumed: bool) -> None:
         """Write the contact problem of every so many steps from here on."""
@@ -286,7 +263,7 @@ class Runner:
     def _begin_stage(self, stage: Stage) -> bool:
         """Begin one Simulate statement with its first row; return whether it goes on."""
         from mbsim.integrators import scheme
-        from mbsim.run.start import assemble_again, limit_first
+        from mbsim.run.start import limit_first
         from mbsim.run.statics import balance_bodies
 
         method, simulation = self.method, stage.simulation
@@ -304,11 +281,11 @@ class Runner:
         method.memory[scheme.LAST_STEP] = 0.0
         method.counts[scheme.NEXT_OUTPUT] = 1
         t, goes_on = simulation.start_time, True
+        if self.commands.interrupts(self.stage):
+            self.commands.assemble(self.stage, self.hooks, t, method.y, self.log.line, self._say)
         if simulation.analysis_type == "STATIC":
             balance_bodies(self.system, self.hooks, simulation, method.y, method.k[0], self._say)
             goes_on = False
-        elif self._interrupts(self.stage):
-            assemble_again(self.system, self.hooks, t, method.y)
         if goes_on and self.methods.explicit.order > 0.0:
             limit_first(self.system, self.hooks, t, method, self._say)
         if (
@@ -356,7 +333,7 @@ class Runner:
                 pull = self.system.pull(passed.simulation.gravity)
                 scene.world.gravity[:], scene.world.weight[0] = pull.constant, pull.program
         scene.world.scale[TOLERANCE] = stage.tol
-        self._change()
+        self.commands.apply(self.stage, fresh, self.methods, self.log.line)
         plan = scene.audit.plan
         plan[AUDIT_TOL], plan[AUDIT_UNTIL] = stage.tol, simulation.end_time
         if fresh:

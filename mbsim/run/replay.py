@@ -22,6 +22,7 @@ from mbsim.arrays.codes import USED_INCIDENTS
 from mbsim.core.stored import read_regular
 from mbsim.errors import ModelError
 from mbsim.integrators.catalog import RIGID
+from mbsim.run.activity import Activity
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
@@ -148,6 +149,8 @@ class Replay:
             self.stages = [parameters(self.system, changes) for changes in given]
             self.system.scene = make_room(self.system.scene, self.stages)
         self.stage = -1
+        switches = any(stage.simulation.inactive for stage in self.settings.stages)
+        self.activity = Activity(self.system) if switches else None
 
     def _open(self) -> None:
         """Compile, or load, what evaluates a row."""
@@ -200,6 +203,8 @@ class Replay:
         stage = max(sum(begin <= time for begin in begins) - 1, 0)
         if self.stages and stage != self.stage:
             apply(self.system.scene, self.stages[stage])
+        if self.activity is not None and stage != self.stage:
+            self.activity.apply(self.settings.stages[stage].simulation.inactive)
         self.stage = stage
 
     def _row(self, time: float, y: Array, incidents: Array) -> Row:

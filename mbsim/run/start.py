@@ -66,15 +66,15 @@ def assemble_model(
     return found
 
 
-def assemble_again(system: System, hooks: HookCalls, t: float, y: Any) -> None:
-    """Give the bodies the velocities that motions ask for, after a stage that had none."""
+def assemble_again(system: System, hooks: HookCalls, t: float, y: Any) -> Assembly | None:
+    """Bring bodies and their velocities onto what holds from here on; None without joints."""
     serve = hooks.joints_at(t)
     if serve is None:
-        return
+        return None
     from mbsim.dynamics.initial.assembly import ContradictionError, assemble, contradiction
 
     try:
-        assemble(system.scene, y, serve, {})
+        return assemble(system.scene, y, serve, {})
     except ContradictionError as error:
         raise ModelError(contradiction(system, error)) from None
 
@@ -141,6 +141,7 @@ def unknown_overlaps(system: System) -> list[str]:
 def overlaps(system: System, log: Tell, tell: Tell) -> list[str]:
     """Report shapes that overlap at the start; return a line for each that is too deep."""
     from mbsim.arrays.codes import ACTIVE
+    from mbsim.dynamics.contact.forces import IGNORE_DEEPER
 
     scene, model = system.scene, system.model
     faults = unknown_overlaps(system)
@@ -158,6 +159,8 @@ def overlaps(system: System, log: Tell, tell: Tell) -> list[str]:
         rows = (int(pairs.graphic_i[pair]), int(pairs.graphic_j[pair]))
         graphic_i, graphic_j = (system.graphic_ids[row] for row in rows)
         k = int(scene.kinds.contact[pairs.kind[pair]])
+        if scene.contacts.numbers[k, IGNORE_DEEPER] < 0.0:
+            continue  # it takes no part
         sides = [scene.graphics.half[row] for row in rows]
         if depth < _ROUNDING * min(float(side.max()) for side in sides):
             continue

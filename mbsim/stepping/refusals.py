@@ -44,7 +44,9 @@ def serves_better(model: Model) -> str:
     short as they are stiff.
     """
     moving = sum(not body.is_ground for body in model.bodies.values())
-    if not model.contacts or moving < MANY or any(table for _, table, _ in _refused(model)):
+    switched = any(simulation.inactive for simulation in model.simulations)
+    refused = switched or any(table for _, table, _ in _refused(model))
+    if not model.contacts or moving < MANY or refused:
         return ""
     return (
         f"{moving} free bodies in contact: integrator MOREAU takes them as rigid, by steps that "
@@ -54,6 +56,12 @@ def serves_better(model: Model) -> str:
 
 def refuse(model: Model) -> None:
     """Raise what a model has that MOREAU cannot run."""
+    for simulation in model.simulations:
+        if simulation.inactive:
+            raise ModelError(
+                f"{model.file}:{simulation.source.line}: Simulate: integrator MOREAU cannot run "
+                "this: elements are not active all the time; take AUTO"
+            )
     for statement, elements, why in _refused(model):
         for element in elements.values():
             xml = getattr(element, "statement", statement)

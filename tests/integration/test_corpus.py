@@ -25,7 +25,7 @@ _CHECK = re.compile(r"check: (\d+)\.F(\d) at (\S+) = (\S+) within (\S+)")
 _RUN = re.compile(r"run: (.*)")
 _REFUSED = re.compile(r"refused: (\d+): (.*)")
 #: Decks that a command file runs.
-_PARTS = ("adams_held_state.adm", "adams_spring.adm")
+_PARTS = ("adams_activity.adm", "adams_held_state.adm", "adams_spring.adm")
 
 
 def decks(pattern: re.Pattern[str]) -> list[Any]:

@@ -26,7 +26,7 @@ DECKS = sorted(
     if "refused" not in path.name
 )
 #: Attributes that name an element of no certain sort, or of one that is refused.
-ANY_SORT = {"elem_id", "node_id", "i_flexbody_id", "j_flexbody_id"}
+ANY_SORT = {"elem_id", "element_id", "node_id", "i_flexbody_id", "j_flexbody_id"}
 
 
 def content(node):

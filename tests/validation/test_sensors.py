@@ -189,8 +189,8 @@ def test_touch_and_leave_stand_at_their_own_times(tmp_path):
     [
         (sensor(1, "DZ(77)"), "77"),
         (sensor(1, "TIME", "NE"), 'compare="NE".*GE, LE, GT, LT, EQ'),
-        (sensor(1, "TIME", evaluate_id=3), "evaluate_id.*Sensor_Evaluate.*not built.*evaluate"),
-        ('<Sensor_Evaluate id="3" expr="TIME"/>', r"Sensor_Evaluate\[3\].*not built"),
+        (sensor(1, "TIME", evaluate_id=3), 'evaluate_id="3": no Sensor_Evaluate has this id'),
+        ('<Sensor_Evaluate id="3" expr="DZ(77)"/>', r"Sensor_Evaluate\[3\].*77"),
         (sensor(1, "TIME", dt=-1), 'dt="-1".*> 0'),
         ('<Post_Request id="1" type="EXPRESSION" expr2="SENVAL(4)"/>', "4"),
     ],

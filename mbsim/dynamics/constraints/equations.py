@@ -108,8 +108,9 @@ def fill_equation(scene: Scene, t: float, y: F1, e: int) -> None:
 
 
 def lasting(scene: Scene) -> np.ndarray:
-    """Return which equations are of no friction and hold always, (ne,)."""
-    return np.asarray((scene.equations.dry < 0) & (scene.equations.slot < 0))
+    """Return which equations are of no friction, and of elements that take part, (ne,)."""
+    equations = scene.equations
+    return np.asarray((equations.dry < 0) & (equations.slot < 0) & (equations.off == 0))
 
 
 @jitable

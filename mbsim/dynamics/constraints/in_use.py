@@ -24,6 +24,12 @@ def is_active(scene: Scene, e: int) -> bool:
 
 
 @jitable
+def is_off(scene: Scene, e: int) -> bool:
+    """Return whether the element of equation e takes no part now."""
+    return scene.equations.off[e] == 1
+
+
+@jitable
 def is_friction(scene: Scene, e: int) -> bool:
     """Return whether equation e is of friction: it holds only while that sticks."""
     return scene.equations.dry[e] >= 0 or scene.equations.slot[e] >= 0

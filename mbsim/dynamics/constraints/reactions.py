@@ -21,7 +21,7 @@ from mbsim.dynamics.constraints.equations import (
     solve_matrix,
     tree_index,
 )
-from mbsim.dynamics.constraints.in_use import active_count, is_active, is_friction
+from mbsim.dynamics.constraints.in_use import active_count, is_active, is_friction, is_off
 from mbsim.dynamics.constraints.tree import respond
 from mbsim.dynamics.constraints.tree_reactions import add_reaction, add_tree_reactions
 
@@ -100,7 +100,7 @@ def fill_stresses(scene: Scene, t: float, y: F1) -> int:
     """Fill the self-stresses, orthonormal; return their number. Multipliers and p are lost."""
     stress, count = scene.sweep.stress, 0
     for e in range(len(scene.equations.program)):
-        if is_active(scene, e) or is_friction(scene, e):
+        if is_active(scene, e) or is_friction(scene, e) or is_off(scene, e):
             continue
         new = stress[count]
         self_stress(scene, t, y, e, new)

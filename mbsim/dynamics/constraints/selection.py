@@ -41,7 +41,7 @@ from mbsim.dynamics.constraints.equations import (
     tree_index,
 )
 from mbsim.dynamics.constraints.folding import leave_fold, near_fold, watch_fold
-from mbsim.dynamics.constraints.in_use import active_count, is_active, is_friction
+from mbsim.dynamics.constraints.in_use import active_count, is_active, is_friction, is_off
 from mbsim.laws.catalog import STICK
 from mbsim.laws.friction.stiction import KEPT_MODE
 
@@ -131,6 +131,8 @@ def use_all(scene: Scene, sticking: int) -> None:
     active, count = scene.equations.active, 0
     n = len(active) - 1
     for e in range(n):
+        if is_off(scene, e):
+            continue
         if not is_friction(scene, e) or (sticking == 1 and sticks(scene, e)):
             active[count] = e
             count += 1
@@ -203,7 +205,8 @@ def implied_residual(scene: Scene, t: float, y: F1) -> tuple[float, int]:
     """Return the largest residual of the equations not in use, over its unit, and whose it is."""
     largest, worst = 0.0, -1
     for e in range(len(scene.equations.active) - 1):
-        if not is_active(scene, e) and scene.equations.level[e] == 2:
+        waits = not is_active(scene, e) and not is_off(scene, e)
+        if waits and scene.equations.level[e] == 2:
             fill_equation(scene, t, y, e)
             size = abs(scene.sweep.rate[e, RESIDUAL]) / scene.equations.unit[e]
             if not size <= largest:

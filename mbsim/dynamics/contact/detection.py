@@ -49,8 +49,10 @@ def measure_pair(scene: Scene, pair: int) -> bool:
             work.points[first:],
         ),
     )
-    if count < 0 and work.beyond[kinds.contact[kind]] == 0:
-        work.beyond[kinds.contact[kind]] = 1 + pair
+    c = kinds.contact[kind]
+    acts = scene.contacts.numbers[c, IGNORE_DEEPER] >= 0.0
+    if count < 0 and acts and work.beyond[c] == 0:
+        work.beyond[c] = 1 + pair
     if kinds.swapped[kind] == 1:
         for s in range(first, first + kinds.slots[kind]):
             for k in range(3):

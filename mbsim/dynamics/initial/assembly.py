@@ -109,7 +109,7 @@ def _scaled(scene: Scene) -> tuple[Array, Array]:
         first = int(scene.sweep.skyline[r])
         A[r, first : r + 1] = scene.sweep.A[r, first : r + 1]
     A = A + np.tril(A, -1).T
-    size = scene.sweep.size[:n]
+    size = scene.sweep.size[scene.equations.active[:n]]
     return A / np.outer(size, size), size
 
 
@@ -120,7 +120,7 @@ def _count_turns(scene: Scene, y: Array, serve: Serve) -> None:
     for e in range(len(equations.program)):
         k = int(equations.first[e])
         is_motion = equations.program[e] >= 0 and equations.first[e + 1] == k + 1
-        if not is_motion or equations.kind[k] != ANGLE:
+        if not is_motion or equations.off[e] == 1 or equations.kind[k] != ANGLE:
             continue
         given = 0.0 if equations.level[e] == 2 else float(equations.start[e, START_SUM])
         turns = (float(scene.sweep.rate[e, _RESIDUAL]) - given) / (2.0 * np.pi)
@@ -130,9 +130,9 @@ def _count_turns(scene: Scene, y: Array, serve: Serve) -> None:
 
 def _close(scene: Scene, y: Array, serve: Serve, move: int, level: int, column: int) -> None:
     """Take the residuals of a column away, for the equations that hold at that level."""
-    # friction, whose equations are the last, holds nothing yet
-    n = int(lasting(scene).sum())
-    given, levels = scene.equations.start[:n, column], scene.equations.level[:n]
+    # friction holds nothing yet
+    those, unit = np.flatnonzero(lasting(scene)), scene.equations.unit
+    given, levels = scene.equations.start[those, column], scene.equations.level[those]
     starts = (levels < level) & np.isfinite(given)
     held = (levels >= level) | starts
     if not held.any():
@@ -140,9 +140,9 @@ def _close(scene: Scene, y: Array, serve: Serve, move: int, level: int, column: 
     best, stuck = np.inf, 0
     for _ in range(_MOST_ROUNDS):
         serve(Joints.MATRIX, y)
-        residual = np.where(held, scene.sweep.rate[:n, column], 0.0)
+        residual = np.where(held, scene.sweep.rate[those, column], 0.0)
         residual[starts] -= given[starts]
-        worst = float(np.max(np.abs(residual) / scene.equations.unit[:n]))
+        worst = float(np.max(np.abs(residual) / unit[those]))
         stuck = stuck + 1 if worst > 0.5 * best else 0
         best = min(best, worst)
         if worst <= _CLOSED or (stuck >= 3 and best < 1e-10) or stuck >= 20:
@@ -153,12 +153,13 @@ def _close(scene: Scene, y: Array, serve: Serve, move: int, level: int, column: 
             break
         # the equations that are not held at this level must not move
         solution = np.linalg.lstsq(A, -residual / size, rcond=_RANK)[0]
-        scene.sweep.multiplier[:n] = solution / size
+        scene.sweep.multiplier[: len(those)] = solution / size
         serve(move, y)
-    parts = np.abs(residual) / scene.equations.unit[:n]
+    parts = np.abs(residual) / unit[those]
     if not worst <= _OPEN:
-        order = [int(e) for e in np.argsort(-parts) if not parts[e] <= _OPEN or np.isnan(worst)]
-        raise ContradictionError(order, [float(parts[e]) for e in order], column == _MISMATCH)
+        order = [int(k) for k in np.argsort(-parts) if not parts[k] <= _OPEN or np.isnan(worst)]
+        wrong, sizes = [int(those[k]) for k in order], [float(parts[k]) for k in order]
+        raise ContradictionError(wrong, sizes, column == _MISMATCH)
 
 
 def _lost(scene: Scene, y: Array, given: dict[int, Array]) -> list[tuple[int, str, float, float]]:

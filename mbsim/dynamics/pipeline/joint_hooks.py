@@ -138,8 +138,8 @@ def serve(scene: Scene, what: int, t: float, y: F1, dy: F1) -> int:
         use_all(scene, 0)
         prepare_equations(scene, t, y)
         fill_matrix(scene)
-        for e in range(active_count(scene)):
-            fill_size(scene, e)
+        for r in range(active_count(scene)):
+            fill_size(scene, scene.equations.active[r])
     elif what == Joints.CHOOSE:
         prepare_equations(scene, t, y)
         choose(scene, t, y)

@@ -14,16 +14,17 @@ import re
 from pathlib import Path
 
 from mbsim.errors import DeckError, Fault
+from mbsim.reader.activity import ACTIVATE, DEACTIVATE, TYPES, TYPES_NOT_BUILT, ids_of
 from mbsim.reader.adm import statements as decks
 from mbsim.reader.adm.control import build_equilibrium, build_integrator
-from mbsim.reader.adm.declare import AdmStatement
+from mbsim.reader.adm.declare import IDS_BY_COMMAS, AdmStatement, numbers
 from mbsim.reader.adm.draft import AdmDraft, require
 from mbsim.reader.adm.lexer import split_statements, to_node, unique
 from mbsim.reader.adm.translate import read_as
 from mbsim.reader.command import SIMULATE as XML_SIMULATE
 from mbsim.reader.keywords import fold, nearest, spellings
 from mbsim.reader.kinds import COUNT, POSITIVE, REAL, keyword
-from mbsim.reader.statement import Entry, Spec
+from mbsim.reader.statement import Entry, Spec, Statement
 
 _MODEL = re.compile(r"\s*FILE\s*/.*?\bMOD[EL]*\s*=\s*([^,!\s]+)", re.IGNORECASE)
 _KINDS = {
@@ -87,11 +88,56 @@ EQUILIBRIUM = AdmStatement(
     words=decks.BY_KEY["equilibrium"].words,
     xml="Param_Static",
 )
+#: Adams' words for types of elements whose names in MotionSolve are others.
+_WORDS = {"BUSHING": "BUSH", "SPRINGDAMPER": "SPDP", "GEAR": "COUPLER"}
+_TYPES = {"BUSHING", "SPRINGDAMPER", "GEAR", *TYPES.values()} - {"BUSH", "SPDP", "FORCE"}
+_TYPES_NOT_BUILT = {*TYPES_NOT_BUILT.values(), "CLEARANCE"} - {"GEAR"}
+
+
+def _switch(statement: Statement) -> AdmStatement:
+    """Return the command that switches elements of a type, one by one."""
+
+    def build(entry: Entry) -> None:
+        kind, ids, span = entry.get("TYPE"), entry.get("ID"), entry.get("RANGE")
+        if kind is None:
+            require(entry, "TYPE")
+            return
+        if (ids is None) == (span is None):
+            entry.fault(f"{statement.name.upper()}: one of ID and RANGE is needed")
+            return
+        name = _WORDS.get(kind, kind)
+        if span is not None:
+            low, high = map(int, span)
+            ids = tuple(id for id in ids_of(entry.draft, name) if low <= id <= high)
+            if not ids:
+                entry.fault(f"there is no {kind} from {low} to {high}", "RANGE")
+        for id in ids:
+            read_as(entry, statement, {}, {"element_type": name, "element_id": str(id)})
+
+    return AdmStatement(
+        statement.name.upper(),
+        {
+            "TYPE": Spec(keyword(_words(_TYPES), _words(_TYPES_NOT_BUILT))),
+            "ID": Spec(IDS_BY_COMMAS),
+            "RANGE": Spec(numbers(2)),
+        },
+        build,
+        words={name: ("TYPE", name) for name in sorted({*_TYPES, *_TYPES_NOT_BUILT})},
+        xml=statement.name,
+    )
+
+
+def _words(names: set[str]) -> dict[str, str]:
+    return spellings(**dict.fromkeys(sorted(names), ""))
+
+
 _OUTPUT = "results and messages are mbsim's own; it sets nothing"
 COMMANDS = (
     SIMULATE,
     INTEGRATOR,
     EQUILIBRIUM,
+    _switch(ACTIVATE),
+    _switch(DEACTIVATE),
     *(
         decks.output_only(name, _OUTPUT)
         for name in (
@@ -104,7 +150,7 @@ COMMANDS = (
 _BY_KEY = {fold(command.name): command for command in COMMANDS}
 #: Documented commands that change the model or what is done with it.
 NOT_BUILT = (
-    "ACCGRAV ACTIVATE ARRAY BEAM BUSHING CONTACT COUPLER DEACTIVATE DIFF FRICTION GEAR GFORCE "
+    "ACCGRAV ARRAY BEAM BUSHING CONTACT COUPLER DIFF FRICTION GEAR GFORCE "
     "JOINT LINEAR LSE MARKER MOTION PART RELOAD SAVE SENSOR SFORCE SPLINE SPRINGDAMPER TFSISO "
     "VARIABLE VFORCE VTORQUE"
 ).split()
