@@ -28,6 +28,7 @@ COMMANDS = {
     "view": "mbsim.cli.view",
     "report": "mbsim.cli.report",
     "sweep": "mbsim.cli.sweep",
+    "identify": "mbsim.cli.identify",
     "bench": "mbsim.cli.bench",
     "request": "mbsim.cli.request",
     "plot-law": "mbsim.cli.plot_law",

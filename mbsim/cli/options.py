@@ -55,6 +55,25 @@ def resume_option(what: str) -> Decorator:
     return click.option("--resume", is_flag=True, help=f"{what}.")
 
 
+workers_option = click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Processes on this machine.  [default: one a processor]",
+)
+scheduler_option = click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Let a Dask cluster run them, e.g. tcp://host:8786; its page shows what goes on.",
+)
+
+
+def check_workers(workers: int | None, scheduler: str | None) -> None:
+    """Raise `click.UsageError` where both are given."""
+    if scheduler is not None and workers is not None:
+        raise click.UsageError("--workers are of this machine: not with --scheduler")
+
+
 progress_option = click.option(
     "--progress",
     type=click.Choice(["auto", "off"]),

@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING
 import click
 
 from mbsim.cli.messages import counted, echo, warn
-from mbsim.cli.options import folder_option, json_option, progress_option, resume_option
+from mbsim.cli.options import (
+    check_workers,
+    folder_option,
+    json_option,
+    progress_option,
+    resume_option,
+    scheduler_option,
+    workers_option,
+)
 
 if TYPE_CHECKING:
     from mbsim.studies.study import Study
@@ -22,17 +30,8 @@ _MOST_REASONS = 3
 @click.command("sweep")
 @click.argument("file", type=click.Path(path_type=Path), metavar="STUDY.toml")
 @folder_option("the table", "<study name>/")
-@click.option(
-    "--workers",
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="Processes on this machine.  [default: one a processor]",
-)
-@click.option(
-    "--scheduler",
-    metavar="ADDRESS",
-    help="Let a Dask cluster run them, e.g. tcp://host:8786; its page shows what goes on.",
-)
+@workers_option
+@scheduler_option
 @resume_option("Keep the rows that DIR has of the same runs")
 @click.option(
     "--only",
@@ -58,11 +57,11 @@ def command(
     Every row is written down as it comes: what was interrupted goes on with --resume. A run that
     fails, or warns, is a row that says so.
     """
+    from mbsim.cli.runs_bar import RunsBar
     from mbsim.studies.study import read_study
     from mbsim.studies.sweep import sweep
 
-    if scheduler is not None and workers is not None:
-        raise click.UsageError("--workers are of this machine: not with --scheduler")
+    check_workers(workers, scheduler)
     study = read_study(file)
     warn(study.notes)
     folder = output or Path(study.name)
@@ -70,7 +69,7 @@ def command(
         _run_only(study, only, folder, as_json)
         return
     shown = progress == "auto" and sys.stderr.isatty()
-    bar = _Bar() if shown else None
+    bar = RunsBar() if shown else None
     try:
         swept = sweep(
             study,
@@ -84,26 +83,6 @@ def command(
         if bar:
             bar.stop()
     _show(swept, as_json)
-
-
-class _Bar:
-    """A line on standard error with how many runs there are."""
-
-    def __init__(self) -> None:
-        from rich.console import Console
-        from rich.progress import Progress as Line
-
-        self._line = Line(console=Console(stderr=True), transient=True, refresh_per_second=4)
-        self._task = self._line.add_task("runs", total=None)
-        self._line.start()
-
-    def update(self, done: int, count: int) -> None:
-        """Show how far it is."""
-        self._line.update(self._task, total=count, completed=done, description=f"{done} runs")
-
-    def stop(self) -> None:
-        """Remove the line."""
-        self._line.stop()
 
 
 def _run_only(study: Study, only: tuple[int, ...], folder: Path, as_json: bool) -> None:

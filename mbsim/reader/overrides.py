@@ -53,18 +53,22 @@ def apply_overrides(
     ------
     ModelError
         If the form is wrong, or the element, its id or the attribute is not there; the
-        message says what is.
+        message says what is, a line each.
     """
+    faults: list[str] = []
     for text in overrides:
         match = _FORM.fullmatch(text)
         if match is None:
-            raise ModelError(f"--set {text}: must be Element[id].attribute=value")
+            faults.append(f"--set {text}: must be Element[id].attribute=value")
+            continue
         element, index, turn, attribute, value = match.groups()
         try:
             node = _find(sections, element, index, int(turn or 1))
             _set(node, attribute, value.strip(), f"--set {text}", known(node))
         except LookupError as error:
-            raise ModelError(f"--set {text}: {error.args[0]}") from None
+            faults.append(f"--set {text}: {error.args[0]}")
+    if faults:
+        raise ModelError("\n".join(faults))
 
 
 def _statements(sections: Sequence[Node]) -> Iterator[Node]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mbsim.model.request_types import TYPES
+from mbsim.results.names import PARTS
+from mbsim.results.requests import measures_of
 from mbsim.results.units import (
     ACCELERATION,
     ENERGY,
@@ -19,6 +21,7 @@ from mbsim.results.units import (
 )
 
 if TYPE_CHECKING:
+    from mbsim.model.elements import Model
     from mbsim.results.reading import Results
 
 #: By the last word of a signal's name.
@@ -68,3 +71,29 @@ def quantity_of(results: Results, dataset: str, column: int = 0) -> Quantity:
         last = f"request {last}"
     known = _BY_NAME.get(last)
     return known or Quantity(last.replace("_", " ").capitalize())
+
+
+#: Signals of several columns; and what may follow the name of such a one.
+_VECTORS = ("position", "quaternion", "velocity", "angular_velocity", "acceleration")
+_WRENCHES = ("force", "torque")
+_PARTS = {"mag", *(part for parts in PARTS.values() for part in parts)}
+
+
+def quantity_in(model: Model, signal: str) -> tuple[Quantity, bool]:
+    """Return what a signal of a model measures, and whether it is one column."""
+    name, _, part = signal.strip("/").rpartition("/")
+    whole = not name or part not in _PARTS
+    if whole:
+        name = signal.strip("/")
+    group, _, last = name.rpartition("/")
+    if group == "requests":
+        request = model.requests.get(int(last)) if last.isdecimal() else None
+        if whole or request is None or not part.startswith("F"):
+            return Quantity(f"Request {last}"), False
+        column = int(part[1:]) - 1
+        if TYPES[request.type].measures:
+            return _BY_MEASURE[TYPES[request.type].measures[column // 4]], True
+        measure = measures_of(request)[column]
+        return _BY_MEASURE.get(measure, Quantity(f"Request {last}")), True
+    vector = last in (*_VECTORS, *_WRENCHES)
+    return _BY_NAME.get(last, Quantity(last.replace("_", " ").capitalize())), vector != whole

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -119,3 +121,73 @@ class UnitSystem:
 def _power(unit: str, power: int) -> str:
     """Return a unit with its exponent."""
     return unit + {1: "", 2: "²", 3: "³"}.get(power, f"^{power}")
+
+
+#: Units in SI by what may be written: factor, and powers of force, length, time and radian.
+_WRITTEN: dict[str, tuple[float, tuple[int, int, int, int]]] = {
+    written: (float(factor), powers)
+    for table, powers in (
+        (u.FORCE, (1, 0, 0, 0)),
+        (u.LENGTH, (0, 1, 0, 0)),
+        (u.TIME, (0, 0, 1, 0)),
+    )
+    for name, factor in table.items()
+    for written in (SYMBOLS.get(name, name.lower()), name.lower())
+} | {
+    "um": (1e-6, (0, 1, 0, 0)),
+    "us": (1e-6, (0, 0, 1, 0)),
+    "J": (1.0, (1, 1, 0, 0)),
+    "rad": (1.0, (0, 0, 0, 1)),
+    "deg": (math.pi / 180.0, (0, 0, 0, 1)),
+    "1": (1.0, (0, 0, 0, 0)),
+}
+_FACTOR = re.compile(r"([^\W\d\u00b2\u00b3]+|1)\s*(?:\^?\s*(\d)|([\u00b2\u00b3]))?")
+
+
+def in_si(unit: str) -> tuple[float, tuple[int, ...]]:
+    """Return what a unit is in SI, and its powers of force, length, time and radian.
+
+    Parameters
+    ----------
+    unit : str
+        ``mm``, ``m/s``, ``rad/s^2``, ``N*m``: symbols or names of Param_Unit, what follows a slash
+        being divided by.
+
+    Raises
+    ------
+    ValueError
+        If it is no unit; the message says which part is not known.
+    """
+    factor, powers = 1.0, [0, 0, 0, 0]
+    for place, part in enumerate(unit.split("/")):
+        sign = 1 if place == 0 else -1
+        for word in re.split(r"[*\u00b7\s]+", part.strip()):
+            found = _FACTOR.fullmatch(word)
+            if found is None or found[1] not in _WRITTEN:
+                raise ValueError(f"{word!r} is not known; units are such as mm, m/s, N*m, deg, ms")
+            raised = int(found[2] or {"\u00b2": 2, "\u00b3": 3}.get(found[3] or "", 1))
+            one, each = _WRITTEN[found[1]]
+            factor *= one ** (sign * raised)
+            powers = [old + sign * raised * new for old, new in zip(powers, each, strict=True)]
+    return factor, tuple(powers)
+
+
+def factor_from(unit: str, quantity: Quantity, model: UnitSystem) -> float:
+    """Return what a number in `unit` is multiplied with to be one in the model's units.
+
+    Raises
+    ------
+    ValueError
+        If it is no unit, or one of another quantity; the message says what is allowed.
+    """
+    factor, powers = in_si(unit)
+    wanted = (quantity.force, quantity.length, quantity.time, quantity.angle)
+    if powers != wanted:
+        allowed = model.text(quantity)
+        what = f"is measured in units such as {allowed}" if allowed else "has no known unit"
+        raise ValueError(f"{unit!r} does not fit: {quantity.name.lower()} {what}")
+    return factor / (
+        float(u.FORCE[model.force]) ** quantity.force
+        * float(u.LENGTH[model.length]) ** quantity.length
+        * float(u.TIME[model.time]) ** quantity.time
+    )

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import closing
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,7 @@ from mbsim.errors import ModelError
 from mbsim.studies.worker import Row, failed, run_batch
 
 if TYPE_CHECKING:
-    from mbsim.studies.study import Study
+    from mbsim.studies.study import Case, Study
 
 #: Runs of one task, and tasks that each thread of the cluster has in hand or waiting: a scheduler
 #: that holds all tasks of a large study at once dies of it.
@@ -44,33 +45,50 @@ def cluster_rows(study: Study, address: str, runs: Sequence[int]) -> Iterator[Ro
     ModelError
         If nobody answers there.
     """
-    distributed = need_distributed()
-    try:
-        client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
-    except (OSError, ValueError, TimeoutError) as error:
-        raise ModelError(f"--scheduler {address}: no scheduler answers: {error}") from None
-    with client:
-        if runs:
-            yield from _tasks(distributed, client, study, [[runs[0]]])
-        left = list(runs[1:])
-        yield from _tasks(
-            distributed,
-            client,
-            study,
-            [left[k : k + AT_ONCE] for k in range(0, len(left), AT_ONCE)],
-        )
+    with closing(Cluster(study, address)) as cluster:
+        yield from cluster.share(map(study.case, runs), len(runs))
 
 
-def _tasks(distributed: Any, client: Any, study: Study, batches: list[list[int]]) -> Iterator[Row]:
+class Cluster:
+    """Workers of a Dask cluster; arguments and errors as of `cluster_rows`."""
+
+    def __init__(self, study: Study, address: str) -> None:
+        self._distributed = need_distributed()
+        self._study = study
+        self._loaded = False  # whether a run was done
+        try:
+            self._client = self._distributed.Client(address, timeout=PATIENCE, set_as_default=False)
+        except (OSError, ValueError, TimeoutError) as error:
+            raise ModelError(f"--scheduler {address}: no scheduler answers: {error}") from None
+
+    def share(self, cases: Iterable[Case], count: int) -> Iterator[Row]:
+        """Yield the row of each of `count` runs as it comes; the very first run is alone."""
+        coming = iter(cases)
+        if count and not self._loaded:
+            self._loaded = True
+            yield from _tasks(self._distributed, self._client, self._study, [[next(coming)]])
+            count -= 1
+        size = AT_ONCE if count > AT_ONCE * IN_HAND else 1
+        batches = iter(lambda: list(islice(coming, size)), [])
+        yield from _tasks(self._distributed, self._client, self._study, batches)
+
+    def close(self) -> None:
+        """Let go of the cluster, which drops what is not done."""
+        self._client.close()
+
+
+def _tasks(
+    distributed: Any, client: Any, study: Study, batches: Iterable[list[Case]]
+) -> Iterator[Row]:
     """Yield rows of batches; the scheduler holds a few tasks at a time, and none that is done."""
     waiting = iter(batches)
     threads = sum(client.nthreads().values())
     hold = max(2, IN_HAND * threads)
     done = distributed.as_completed(loop=client.loop)
-    runs_of: dict[str, list[int]] = {}
+    runs_of: dict[str, list[Case]] = {}
 
-    def submit(batch: list[int]) -> None:
-        future = client.submit(run_batch, study, [study.case(run) for run in batch], pure=False)
+    def submit(batch: list[Case]) -> None:
+        future = client.submit(run_batch, study, batch, pure=False)
         runs_of[future.key] = batch
         done.add(future)
 
@@ -85,9 +103,9 @@ def _tasks(distributed: Any, client: Any, study: Study, batches: list[list[int]]
             yield from (Row(*row) for row in found)
         elif len(batch) > 1:
             # which of them killed the worker is found by running each alone
-            for run in batch:
-                submit([run])
+            for case in batch:
+                submit([case])
         else:
-            yield failed(batch[0], f"{type(error).__name__}: {error}", lost=True)
+            yield failed(batch[0].run, f"{type(error).__name__}: {error}", lost=True)
         for more in islice(waiting, max(0, hold - len(runs_of))):
             submit(more)

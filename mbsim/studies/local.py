@@ -9,7 +9,7 @@ import contextlib
 import multiprocessing
 import os
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from multiprocessing.connection import Connection, wait
 from typing import TYPE_CHECKING, Any
 
@@ -36,7 +36,7 @@ def serve(connection: Connection, study: Study) -> None:
 
 
 class _Worker:
-    """A process, its pipe, and the runs that it has not sent a row of, in order."""
+    """A process, its pipe, and the runs that it has not sent a row of, in order, by number."""
 
     def __init__(self, study: Study) -> None:
         context = multiprocessing.get_context("spawn")
@@ -44,11 +44,11 @@ class _Worker:
         self.process = context.Process(target=serve, args=(other, study), daemon=True)
         self.process.start()
         other.close()  # so that its end is felt here
-        self.runs: deque[int] = deque()
+        self.runs: dict[int, Case] = {}
 
     def give(self, cases: list[Case]) -> None:
         """Hand over runs."""
-        self.runs.extend(case.run for case in cases)
+        self.runs.update((case.run, case) for case in cases)
         with contextlib.suppress(OSError):  # it has died: felt when it is read from
             self.connection.send(cases)
 
@@ -73,45 +73,60 @@ class Workers:
 
     def __init__(self, study: Study, count: int) -> None:
         self._study, self._count = study, count
-        self._waiting: deque[int] = deque()
+        # those that come, those of them that had been handed out, and how many there are of both
+        self._coming: Iterator[Case] = iter(())
+        self._back: deque[Case] = deque()
+        self._left = 0
+        self._loaded = False  # whether a worker has sent a row
         self._workers: list[_Worker] = []
         self._tries: dict[int, int] = {}
         self.died = 0
 
     def rows(self, runs: Sequence[int]) -> Iterator[Row]:
-        """Yield the row of every run as it comes.
-
-        The first run is alone, so that what the others load is compiled once.
-        """
-        self._waiting.extend(runs)
+        """Yield the row of every run as it comes, and let the processes end."""
         try:
-            self._workers = [_Worker(self._study)] if runs else []
-            most = 1
-            while self._waiting or any(worker.runs for worker in self._workers):
-                self._hand_out(most)
-                busy = [worker for worker in self._workers if worker.runs]
-                ready = wait([worker.connection for worker in busy])
-                for worker in busy:
-                    row = self._take(worker) if worker.connection in ready else None
-                    if row is None:
-                        continue
-                    yield row
-                    if most == 1:
-                        left = len(self._waiting)
-                        most = max(1, min(MOST_AT_ONCE, left // (COMES_BACK * self._count)))
-                        more = min(self._count - 1, left - 1)
-                        self._workers += [_Worker(self._study) for _ in range(more)]
+            yield from self.share(map(self._study.case, runs), len(runs))
         finally:
-            for worker in self._workers:
-                worker.end()
+            self.close()
+
+    def share(self, cases: Iterable[Case], count: int) -> Iterator[Row]:
+        """Yield the row of each of `count` runs as it comes; processes stay for more.
+
+        The very first run is alone, so that what the others load is compiled once.
+        """
+        self._coming, self._left = iter(cases), count
+        most = 0
+        while self._left or any(worker.runs for worker in self._workers):
+            if self._loaded and not most:
+                most = max(1, min(MOST_AT_ONCE, self._left // (COMES_BACK * self._count)))
+            wanted = min(self._count, self._left) if self._loaded else 1
+            self._workers += [_Worker(self._study) for _ in range(wanted - len(self._workers))]
+            self._hand_out(most or 1)
+            busy = [worker for worker in self._workers if worker.runs]
+            ready = wait([worker.connection for worker in busy])
+            for worker in busy:
+                row = self._take(worker) if worker.connection in ready else None
+                if row is not None:
+                    self._loaded = True
+                    yield row
+
+    def close(self) -> None:
+        """Let all processes end, at once."""
+        for worker in self._workers:
+            worker.end()
+        self._workers = []
 
     def _hand_out(self, most: int) -> None:
         """Give workers without runs some of those that wait."""
         for worker in self._workers:
-            if not worker.runs and self._waiting:
-                size = min(most, len(self._waiting))
-                runs = [self._waiting.popleft() for _ in range(size)]
-                worker.give([self._study.case(run) for run in runs])
+            if not worker.runs and self._left:
+                size = min(most, self._left)
+                self._left -= size
+                worker.give([self._next() for _ in range(size)])
+
+    def _next(self) -> Case:
+        """Return the next run that waits."""
+        return self._back.popleft() if self._back else next(self._coming)
 
     def _take(self, worker: _Worker) -> Row | None:
         """Return a row that a worker has sent; where it has died, one if that is the last word."""
@@ -119,7 +134,7 @@ class Workers:
             row: Any = worker.connection.recv()
         except (EOFError, OSError):
             return self._lost(worker)
-        worker.runs.remove(row.run)
+        del worker.runs[row.run]
         return Row(*row)
 
     def _lost(self, worker: _Worker) -> Row | None:
@@ -129,10 +144,17 @@ class Workers:
         worker.end()
         self.died += 1
         self._workers[self._workers.index(worker)] = _Worker(self._study)
-        in_hand, *others = worker.runs
-        tries = self._tries[in_hand] = self._tries.get(in_hand, 0) + 1
-        self._waiting.extendleft(reversed(others))
+        in_hand, *others = worker.runs.values()
+        tries = self._tries[in_hand.run] = self._tries.get(in_hand.run, 0) + 1
+        self._return(others)
         if tries >= MOST_TRIES:
-            return failed(in_hand, f"its process died {tries} times, exit code {code}", lost=True)
-        self._waiting.appendleft(in_hand)
+            return failed(
+                in_hand.run, f"its process died {tries} times, exit code {code}", lost=True
+            )
+        self._return([in_hand])
         return None
+
+    def _return(self, cases: list[Case]) -> None:
+        """Let runs that were handed out be the next ones."""
+        self._back.extendleft(reversed(cases))
+        self._left += len(cases)

@@ -7,7 +7,7 @@ import hashlib
 import json
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -148,7 +148,7 @@ def read_study(file: str | Path) -> Study:
         All that is wrong with it, a line each.
     """
     path = Path(file)
-    data = _load(path)
+    data = load_toml(path)
     faults: list[str] = []
     if extra := sorted(data.keys() - set(_TABLES)):
         faults.append(f"unknown table {', '.join(extra)}; known: {', '.join(_TABLES)}")
@@ -157,8 +157,9 @@ def read_study(file: str | Path) -> Study:
         if not isinstance(table, dict):
             raise ModelError(f"{path}: {name}: must be a table")
     about = _about(tables["study"], path, faults)
-    options = _options(tables["run"], path, faults)
-    spreads, paths = _parameters(tables["parameters"], tables["set"], faults)
+    options = read_options(tables["run"], path, faults)
+    spreads = _spreads(tables["parameters"], faults)
+    paths = read_paths(tables["parameters"], tables["set"], faults)
     outputs = _outputs(tables["outputs"], spreads, faults)
     if faults:
         raise ModelError("\n".join(f"{path}: {fault}" for fault in faults))
@@ -172,8 +173,8 @@ def read_study(file: str | Path) -> Study:
     return study
 
 
-def _load(path: Path) -> dict[str, Any]:
-    """Return the tables of a TOML file."""
+def load_toml(path: Path) -> dict[str, Any]:
+    """Return the tables of a TOML file, or raise `ModelError`."""
     if sys.version_info >= (3, 11):
         import tomllib
     else:
@@ -228,8 +229,11 @@ def _about(table: Mapping[str, Any], path: Path, faults: list[str]) -> dict[str,
     }
 
 
-def _options(table: Mapping[str, Any], path: Path, faults: list[str]) -> dict[str, Any]:
-    """Return the options of [run], paths of plugins being those from here."""
+def read_options(table: Mapping[str, Any], path: Path, faults: list[str]) -> dict[str, Any]:
+    """Return the options of [run], paths of plugins being those from here.
+
+    What is wrong is added to `faults`.
+    """
     for name, value in table.items():
         if name not in _RUN:
             faults.append(f"run: unknown {name}; known: {', '.join(_RUN)}")
@@ -241,11 +245,28 @@ def _options(table: Mapping[str, Any], path: Path, faults: list[str]) -> dict[st
     return found
 
 
-def _parameters(
-    tables: Mapping[str, Any], given: Mapping[str, Any], faults: list[str]
-) -> tuple[dict[str, Spread], dict[str, str]]:
-    """Return the values of all parameters, and what they and [set] change in the deck."""
+def _spreads(tables: Mapping[str, Any], faults: list[str]) -> dict[str, Spread]:
+    """Return the values of all parameters."""
     spreads: dict[str, Spread] = {}
+    for name, table in tables.items():
+        if isinstance(table, dict):
+            try:
+                spreads[name] = read_spread(table)
+            except ModelError as error:
+                faults.append(f"parameters.{name}: {error}")
+    return spreads
+
+
+def read_paths(
+    tables: Mapping[str, Any],
+    given: Mapping[str, Any],
+    faults: list[str],
+    elsewhere: Collection[str] = (),
+) -> dict[str, str]:
+    """Return what parameters and [set] change in the deck, as `Study.paths`.
+
+    `elsewhere` names parameters that change something else; what is wrong is added to `faults`.
+    """
     paths: dict[str, str] = {}
     if not tables:
         faults.append("parameters: there are none")
@@ -255,10 +276,6 @@ def _parameters(
         if not isinstance(table, dict):
             faults.append(f"parameters.{name}: must be a table")
             continue
-        try:
-            spreads[name] = read_spread(table)
-        except ModelError as error:
-            faults.append(f"parameters.{name}: {error}")
         where = table.get("path", [])
         listed = [where] if isinstance(where, str) else where
         if not isinstance(listed, list) or not all(isinstance(each, str) for each in listed):
@@ -272,7 +289,7 @@ def _parameters(
         if each in paths:
             faults.append(f"set.{each}: a parameter sets it too")
         paths[each] = text if isinstance(text, str) else written(text)
-    used: set[str] = set()
+    used = set(elsewhere)
     for each, text in paths.items():
         try:
             parts = _parts(text, tables)
@@ -285,7 +302,7 @@ def _parameters(
         for name in tables
         if name not in used
     ]
-    return spreads, paths
+    return paths
 
 
 def _parts(text: str, names: Mapping[str, Any]) -> list[str | Formula]:

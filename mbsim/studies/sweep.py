@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +19,8 @@ from mbsim.studies.table import SUFFIX, need_pyarrow, write_table
 from mbsim.studies.worker import FAILED, Row, run_one
 
 if TYPE_CHECKING:
+    from mbsim.compile_model.build import System
+    from mbsim.run.settings import Settings
     from mbsim.studies.study import Study
 
 #: Called with how many rows there are, and how many there will be.
@@ -160,18 +162,37 @@ def model_digest(study: Study) -> str:
     DeckError, ModelError
         If the deck is at fault, or the first run's changes or an output name what it has not.
     """
-    from mbsim.compile_model.build import build
     from mbsim.reader.keywords import fold
-    from mbsim.reader.xml import read_model
     from mbsim.results.identity import Identity
-    from mbsim.results.signal_filter import SignalFilter
-    from mbsim.results.signals import names_of
+
+    system, _ = checked_system(study, _first_changes(study))
+    if faults := check_signals(study, system, "outputs:"):
+        raise ModelError("\n".join(f"{study.file}: {line}" for line in faults))
+    facts: dict[str, Any] = Identity(system).facts
+    # without what differs from run to run, so that a study that grows keeps its rows
+    changed = {fold(path.rpartition(".")[0]) for path in study.paths}
+    others = {name: fact for name, fact in facts["model"].items() if fold(name) not in changed}
+    about = [system.model.sha256, others, facts["subroutines"]]
+    text = json.dumps(about, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def checked_system(study: Study, changes: Mapping[str, str]) -> tuple[System, Settings]:
+    """Return a study's deck, with changes, as a system, and how it is run.
+
+    Raises
+    ------
+    DeckError, ModelError
+        If the deck is at fault, or a change names what it has not.
+    """
+    from mbsim.compile_model.build import build
+    from mbsim.reader.xml import read_model
     from mbsim.run.settings import settle
 
-    with_changes = read_model(study.model, _first_changes(study))
+    with_changes = read_model(study.model, changes)
     options = study.options
     how = (options.get(name) for name in ("end_time", "print_interval", "integrator", "tol"))
-    settle(with_changes, *how)
+    settings = settle(with_changes, *how)
     plugins = [Path(file) for file in options.get("plugins", [])]
     system = build(
         with_changes,
@@ -180,19 +201,20 @@ def model_digest(study: Study) -> str:
         options.get("detector", "auto"),
         lambda line: None,
     )
+    return system, settings
+
+
+def check_signals(study: Study, system: System, key: str) -> list[str]:
+    """Return which of a study's signals the deck has not, a line each that begins with `key`."""
+    from mbsim.results.signal_filter import SignalFilter
+    from mbsim.results.signals import names_of
+
     known = [*names_of(system), *(f"requests/{id}" for id in system.model.requests)]
     try:
         SignalFilter(study.signals).check(known)
     except ModelError as error:
-        text = str(error).replace("--signals ", "outputs: ")
-        raise ModelError("\n".join(f"{study.file}: {line}" for line in text.split("\n"))) from None
-    facts: dict[str, Any] = Identity(system).facts
-    # without what differs from run to run, so that a study that grows keeps its rows
-    changed = {fold(path.rpartition(".")[0]) for path in study.paths}
-    others = {name: fact for name, fact in facts["model"].items() if fold(name) not in changed}
-    about = [with_changes.sha256, others, facts["subroutines"]]
-    text = json.dumps(about, sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()
+        return str(error).replace("--signals", key).split("\n")
+    return []
 
 
 def _first_changes(study: Study) -> dict[str, str]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import threading
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -102,6 +103,30 @@ def _row(study: Study, case: Case, results: Results, warnings: list[str]) -> Row
     status = WARNED if warnings else FINISHED
     reason = "; ".join(dict.fromkeys(warnings))
     return Row(case.run, status, reason, values, int(stats["steps"]), int(stats["rhs_evaluations"]))
+
+
+class Pool(Protocol):
+    """Who runs cases of a study: processes of this machine, a cluster, or this process."""
+
+    def share(self, cases: Iterable[Case], count: int) -> Iterator[Row]:
+        """Yield the row of each of `count` runs as it comes."""
+
+    def close(self) -> None:
+        """Let go of what runs them."""
+
+
+class Here:
+    """A pool that is the process itself."""
+
+    def __init__(self, study: Study) -> None:
+        self._study = study
+
+    def share(self, cases: Iterable[Case], count: int) -> Iterator[Row]:
+        """Yield the row of each run in turn."""
+        return (run_one(self._study, case) for case in cases)
+
+    def close(self) -> None:
+        """Do nothing: there is nothing to let go of."""
 
 
 def run_batch(study: Study, cases: list[Case]) -> list[Row]:

@@ -72,18 +72,21 @@ def pack_elements(packs: Sequence[RunData]) -> str:
     )
 
 
-def document(title: str, body: str, style: str, script: str, connect: str = "'none'") -> str:
+def document(
+    title: str, body: str, style: str, script: str, connect: str = "'none'", view: bool = True
+) -> str:
     """Return a page that needs nothing else: its body, opened, and what it is shown and run by.
 
-    `title` is escaped here; `script` follows ours; `connect` as in `page`.
+    `title` is escaped here; `script` follows ours; `connect` as in `page`; without `view` the page
+    has nothing that draws bodies.
     """
     text = static("page.html").format(
         title=escape(title),
         connect=connect,
         style=style,
         body=body.rstrip(),
-        library=library(),
-        script=scripts() + script,
+        library=library() if view else "",
+        script=scripts() + script if view else script,
     )
     # bytes of file names that are no text as escapes
     return text.encode("utf-8", "backslashreplace").decode("utf-8")

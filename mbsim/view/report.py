@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
@@ -41,19 +42,29 @@ def report(results: Results) -> str:
         ("Counters", parts.counters(results)),
         ("Deck and user files", _texts(results, model)),
     ]
+    style = static("view.css") + static("report.css")
+    return paged(f"{name}: report", name, sections, style, static("report.js"))
+
+
+def paged(
+    title: str, name: str, sections: Sequence[tuple[str, str]], style: str, script: str = ""
+) -> str:
+    """Return a page of sections, each a heading and its HTML; those without text are left out.
+
+    `script` mounts the view, without which the page has none.
+    """
     body = static("report.html").format(
         name=escape(name),
         contents="".join(
-            f'<a href="#{_anchor(title)}">{escape(title)}</a>' for title, text in sections if text
+            f'<a href="#{_anchor(head)}">{escape(head)}</a>' for head, text in sections if text
         ),
         sections="\n".join(
-            f'<section id="{_anchor(title)}"><h2>{escape(title)}</h2>\n{text}</section>'
-            for title, text in sections
+            f'<section id="{_anchor(head)}"><h2>{escape(head)}</h2>\n{text}</section>'
+            for head, text in sections
             if text
         ),
     )
-    style = static("view.css") + static("report.css")
-    return document(f"{name}: report", body, style, static("report.js"))
+    return document(title, body, style, script, view=bool(script))
 
 
 def _anchor(title: str) -> str:
