@@ -80,11 +80,7 @@ def _of(module: str, name: str) -> Callable[[Scene], Callable[..., Any]]:
 
 def _any(table: str, column: str) -> Callable[[Scene, Method], bool]:
     """Return what says whether a column of a scene's table has any entry that is not 0."""
-
-    def when(scene: Scene, method: Method) -> bool:
-        return bool(np.any(getattr(getattr(scene, table), column)))
-
-    return when
+    return lambda scene, method: bool(np.any(getattr(getattr(scene, table), column)))
 
 
 def _gauges(scene: Scene) -> Callable[..., Any]:
