@@ -68,7 +68,9 @@ EXPLICIT = [name for name in FRICTIONS if name != "INFINITE"]
 EVERY = [
     *((depth, friction, "DOPRI5") for depth in DEPTHS for friction in EXPLICIT),
     # with a user's own memory the peaks of an L that rocks take 26,000 steps of RADAU5
-    *(("LARGEST", friction, "RADAU5") for friction in FRICTIONS if friction != "CFFSUB"),
+    *(("LARGEST", friction, "RADAU5") for friction in EXPLICIT if friction != "CFFSUB"),
+    # the L rocks from peak to peak: 70 s
+    pytest.param("LARGEST", "INFINITE", "RADAU5", marks=pytest.mark.slow),
     ("FIELD", "CFFSUB", "RADAU5"),
     *(("FIELD", friction, "GALPHA") for friction in FRICTIONS),
     ("VOLUME", "INFINITE", "RADAU5"),
@@ -101,7 +103,15 @@ def test_resumed_and_asked_again_it_is_the_same_to_the_last_bit(
 #: LARGEST without give is left out: at this tol a step falls to nothing as the L's peaks change,
 #: and the run says so.
 AGREE = [
-    (depth, friction)
+    pytest.param(
+        depth,
+        friction,
+        # the three that take longest, 15 to 22 s each
+        marks=[pytest.mark.slow]
+        if (depth, friction)
+        in (("LARGEST", "CFFSUB"), ("LARGEST", "STICTION"), ("VOLUME", "INFINITE"))
+        else [],
+    )
     for depth in DEPTHS
     for friction in FRICTIONS
     if (depth, friction) != ("LARGEST", "INFINITE")

@@ -87,7 +87,7 @@ def test_resumed_while_it_is_stiff_auto_is_the_same_run(name, tmp_path, impatien
 @pytest.mark.parametrize("method", ["RADAU5", "GALPHA"])
 def test_when_results_are_written_changes_nothing(method, tmp_path, impatient, monkeypatch):
     model = mbsim.read_model(STIFF / "four_bar_stop.xml")
-    settings = {"integrator": method, "end_time": 0.1}
+    settings = {"integrator": method, "end_time": 0.03}
     straight = mbsim.simulate(model, **settings)
     monkeypatch.setattr(recorder.Recorder, "due", lambda self: True)
     same(mbsim.simulate(model, output=tmp_path, **settings), straight)

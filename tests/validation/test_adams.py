@@ -317,7 +317,14 @@ def channels_of(case, results):
     return found
 
 
-@pytest.mark.parametrize("case", CASES)
+#: Those whose integration takes 10 to 20 s.
+LONG = ("RevSpherical_Case01", "Distance_Case02")
+
+
+@pytest.mark.parametrize(
+    "case",
+    [pytest.param(c, marks=[pytest.mark.slow] if c in LONG else []) for c in CASES],
+)
 def test_an_independent_integration_finds_the_curves(case):
     worst = {}
     for channel, ours in exact(case).items():
