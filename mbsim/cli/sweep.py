@@ -55,7 +55,8 @@ def command(
     """Run a deck as often as STUDY.toml says, and write DIR/<study>.parquet, a row a run.
 
     Every row is written down as it comes: what was interrupted goes on with --resume. A run that
-    fails, or warns, is a row that says so.
+    fails, or warns, is a row that says so. A design that draws from distributions gives bands of
+    the outputs, and Saltelli's Sobol indices, in DIR/<study>.uncertainty.json too.
     """
     from mbsim.cli.runs_bar import RunsBar
     from mbsim.studies.study import read_study
@@ -104,6 +105,7 @@ def _run_only(study: Study, only: tuple[int, ...], folder: Path, as_json: bool) 
 def _show(swept: Swept, as_json: bool) -> None:
     """Print what came of a sweep."""
     from mbsim.cli.messages import print_json
+    from mbsim.studies.uncertainty import lines_of, warnings_of
 
     if as_json:
         print_json(
@@ -113,14 +115,18 @@ def _show(swept: Swept, as_json: bool) -> None:
                 **{name: swept.counts.get(name, 0) for name in ("finished", "warned", "failed")},
                 "kept": swept.kept,
                 "reasons": [{"runs": number, "reason": why} for number, why in swept.reasons],
+                "uncertainty": swept.uncertainty,
             }
         )
         return
     counts = ", ".join(f"{number} {name}" for name, number in sorted(swept.counts.items()))
     already = f"; {swept.kept} were there" if swept.kept else ""
     echo(f"{swept.table}: {counted(sum(swept.counts.values()), 'runs')}, {counts}{already}")
+    for line in lines_of(swept.uncertainty) if swept.uncertainty else ():
+        echo(line)
     warn(
         f"{counted(number, 'runs')} failed: {why}" for number, why in swept.reasons[:_MOST_REASONS]
     )
     if more := len(swept.reasons) - _MOST_REASONS:
         warn([f"{more} more reasons are in the table"] if more > 0 else [])
+    warn(warnings_of(swept.uncertainty) if swept.uncertainty else [])

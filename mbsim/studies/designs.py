@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 #: Most runs of a study: more is a mistyped number.
 MOST_RUNS = 10_000_000
+#: Fewest blocks of a Saltelli design: intervals are resamplings of them.
+FEWEST_BLOCKS = 16
 
 
 def grid(study: Study) -> Numbers:
@@ -51,22 +53,59 @@ def sobol(study: Study) -> Numbers:
 
     Sobol, USSR Comp. Math. 7 (1967) 86-112; Owen, J. Complexity 14 (1998) 466-489.
     """
+    return _spread(study, _sobol_points(study, len(study.spreads), study.runs))
+
+
+def _sobol_points(study: Study, axes: int, count: int) -> Any:
+    """Return points of Sobol's sequence in the unit cube, (count, axes)."""
     import warnings
 
     from scipy.stats import qmc
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # no power of 2: `Study.notes` says so
-        points = _sampler(qmc.Sobol, study).random(study.runs)
-    return _spread(study, points)
+        return _sampler(qmc.Sobol, study, axes).random(count)
 
 
-def _sampler(engine: Any, study: Study) -> Any:
+def block_length(study: Study) -> int:
+    """Return how many runs a block of a Saltelli design has."""
+    return len(study.spreads) + 2
+
+
+def saltelli(study: Study) -> Numbers:
+    """Return Saltelli's design, which Sobol indices are estimated from, in blocks of runs.
+
+    A block is a point A, A with one parameter after the other from B, and B; A and B are halves of
+    a point of Sobol's sequence. Saltelli et al., Comput. Phys. Commun. 181 (2010) 259-270.
+
+    Raises
+    ------
+    ModelError
+        If `runs` are no whole blocks, or too few.
+    """
+    length = block_length(study)
+    count, rest = divmod(study.runs, length)
+    if rest or count < FEWEST_BLOCKS:
+        better = max(FEWEST_BLOCKS, 2 ** round(math.log2(max(count, 1))))
+        raise ModelError(
+            f"study.runs = {study.runs}: saltelli needs a multiple of {length}, parameters + 2, "
+            f"and at least {FEWEST_BLOCKS * length}; for example {better * length}"
+        )
+    number = length - 2
+    halves = _sobol_points(study, 2 * number, count)
+    blocks = np.repeat(halves[:, None, :number], length, axis=1)
+    for k in range(number):
+        blocks[:, k + 1, k] = halves[:, number + k]
+    blocks[:, -1] = halves[:, number:]
+    return _spread(study, blocks.reshape(-1, number))
+
+
+def _sampler(engine: Any, study: Study, axes: int = 0) -> Any:
     """Return one of SciPy's engines, seeded; SciPy before 1.15 calls its generator `seed`."""
     from inspect import signature
 
     name = "rng" if "rng" in signature(engine).parameters else "seed"
-    return engine(len(study.spreads), **{name: np.random.default_rng(study.seed)})
+    return engine(axes or len(study.spreads), **{name: np.random.default_rng(study.seed)})
 
 
 def random(study: Study) -> Numbers:
@@ -123,5 +162,8 @@ DESIGNS: dict[str, Callable[[Study], Numbers]] = {
     "latin_hypercube": latin_hypercube,
     "sobol": sobol,
     "random": random,
+    "saltelli": saltelli,
     "csv": table,
 }
+#: Those that draw from the distributions of the parameters.
+SAMPLED = ("latin_hypercube", "sobol", "random", "saltelli")

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from mbsim import __version__
 from mbsim.errors import ModelError
 from mbsim.reader.written import written
-from mbsim.studies.designs import DESIGNS
+from mbsim.studies.designs import DESIGNS, SAMPLED
 from mbsim.studies.distributions import Numbers, Spread, read_spread
 from mbsim.studies.formulas import Formula
 from mbsim.studies.outputs import Output, read_output
@@ -156,7 +156,7 @@ def read_study(file: str | Path) -> Study:
     for name, table in tables.items():
         if not isinstance(table, dict):
             raise ModelError(f"{path}: {name}: must be a table")
-    about = _about(tables["study"], path, faults)
+    about = _about(tables["study"], len(tables["parameters"]), path, faults)
     options = read_options(tables["run"], path, faults)
     spreads = _spreads(tables["parameters"], faults)
     paths = read_paths(tables["parameters"], tables["set"], faults)
@@ -192,8 +192,10 @@ def load_toml(path: Path) -> dict[str, Any]:
         raise ModelError(f"{path}: is no TOML: {error}") from None
 
 
-def _about(table: Mapping[str, Any], path: Path, faults: list[str]) -> dict[str, Any]:
-    """Return what [study] says."""
+def _about(
+    table: Mapping[str, Any], parameters: int, path: Path, faults: list[str]
+) -> dict[str, Any]:
+    """Return what [study] says, for a number of parameters."""
     if extra := sorted(table.keys() - set(_STUDY)):
         faults.append(f"study: unknown {', '.join(extra)}; known: {', '.join(_STUDY)}")
     model, design = table.get("model"), table.get("design", "csv" if "csv" in table else "grid")
@@ -205,7 +207,7 @@ def _about(table: Mapping[str, Any], path: Path, faults: list[str]) -> dict[str,
     for name, value in (("runs", runs), ("seed", seed)):
         if type(value) is not int or value < 0:
             faults.append(f"study.{name} = {value!r}: must be a whole number from 0 on")
-    counted = design in ("latin_hypercube", "sobol", "random")
+    counted = design in SAMPLED
     if counted and runs == 0:
         faults.append(f"study.runs: {design} needs their number")
     if not counted and "runs" in table:
@@ -216,8 +218,11 @@ def _about(table: Mapping[str, Any], path: Path, faults: list[str]) -> dict[str,
         faults.append(f"study.keep = {keep!r}: must be a list of numbers of runs")
         keep = []
     notes: tuple[str, ...] = ()
-    if design == "sobol" and type(runs) is int and runs & (runs - 1):
-        notes = (f"Sobol's sequence is balanced for a power of 2 only; runs = {runs}",)
+    if design in ("sobol", "saltelli") and type(runs) is int:
+        times = 1 if design == "sobol" else parameters + 2
+        if (points := runs // times) & (points - 1):
+            of = f"{points} x {times}" if times > 1 else f"{points}"
+            notes = (f"Sobol's sequence is balanced for a power of 2 only; runs = {of}",)
     return {
         "model": path.parent / str(model),
         "design": design,

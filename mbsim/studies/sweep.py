@@ -13,9 +13,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mbsim.errors import Interrupted, ModelError, SolverError
+from mbsim.results.files import replace_text
 from mbsim.studies.journal import Journal, rows_kept
 from mbsim.studies.local import Workers
-from mbsim.studies.table import SUFFIX, need_pyarrow, write_table
+from mbsim.studies.table import SUFFIX, Responses, need_pyarrow, write_table
+from mbsim.studies.uncertainty import SUFFIX as UNCERTAINTY
+from mbsim.studies.uncertainty import need_salib, uncertainty
 from mbsim.studies.worker import FAILED, Row, run_one
 
 if TYPE_CHECKING:
@@ -41,12 +44,15 @@ class Swept:
         How many rows were there already.
     reasons : list of (int, str)
         Why runs failed: how many, and why, the most frequent first.
+    uncertainty : dict or None
+        Bands and Sobol indices, as ``<study>.uncertainty.json`` has them.
     """
 
     table: Path
     counts: dict[str, int]
     kept: int
     reasons: list[tuple[int, str]]
+    uncertainty: dict[str, Any] | None
 
 
 def sweep(
@@ -64,7 +70,8 @@ def sweep(
     ----------
     study : Study
     folder : Path
-        For ``<study>.parquet``, ``<study>.rows`` (the journal) and ``run-<number>/``.
+        For ``<study>.parquet``, ``<study>.uncertainty.json``, ``<study>.rows`` (the journal) and
+        ``run-<number>/``.
     workers : int, optional
         Local processes; default: one a processor.
     scheduler : str, optional
@@ -87,6 +94,8 @@ def sweep(
     from mbsim.results.files import prepare_directory
 
     need_pyarrow()
+    if study.design == "saltelli":
+        need_salib()
     count = len(study.points)
     model = model_digest(study)
     prepare_directory(folder, study.name)
@@ -120,7 +129,20 @@ def sweep(
     reasons = Counter(row.reason for row in rows if row.status == FAILED).most_common()
     if counts[FAILED] == count:
         raise SolverError(f"{table}: not one of {count} runs came to its end: {reasons[0][0]}")
-    return Swept(table, dict(counts), kept, [(number, why) for why, number in reasons])
+    listed = [(number, why) for why, number in reasons]
+    return Swept(table, dict(counts), kept, listed, _write_uncertainty(study, table))
+
+
+def _write_uncertainty(study: Study, table: Path) -> dict[str, Any] | None:
+    """Write bands and indices beside the table; of a study without them, remove older ones."""
+    path = table.with_name(f"{study.name}{UNCERTAINTY}")
+    about = uncertainty(study, Responses(table))
+    if about is None:
+        with suppress(OSError):
+            path.unlink()
+    else:
+        replace_text(path, json.dumps(about, indent=1, allow_nan=False) + "\n")
+    return about
 
 
 def _rows(

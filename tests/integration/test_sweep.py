@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
 import os
+import re
 import shutil
 import signal
 import socket
@@ -24,6 +26,7 @@ from mbsim.studies.local import MOST_TRIES, Workers
 from mbsim.studies.study import read_study
 from mbsim.studies.sweep import model_digest, sweep
 from mbsim.studies.table import Responses, write_table
+from mbsim.studies.uncertainty import sobol_indices
 
 pytest.importorskip("pyarrow")
 
@@ -228,6 +231,38 @@ def test_the_command(tmp_path, monkeypatch):
     found = runner.invoke(main, ["sweep", str(file), "--only", "12"])
     assert found.exit_code == 2
     assert "no run 12; runs are 0 to 11" in found.output
+
+
+def test_bands_and_sobol_indices_beside_the_table(tmp_path, monkeypatch):
+    pytest.importorskip("SALib")
+    monkeypatch.chdir(tmp_path)
+    text = STUDY.replace("latin_hypercube", "saltelli").replace(', scale = "log"', "")
+    text += 'sum = {{ formula = "k/1.5e8 + 15*mu" }}\nlate = {{ formula = "log(mu - 0.12)" }}\n'
+    file = study_file(tmp_path, text, runs=32 * 4, end=0.02)
+    found = CliRunner().invoke(main, ["sweep", str(file), "--workers", "1"])
+    assert found.exit_code == 0, found.output
+    about = json.loads((tmp_path / "ball" / "ball.uncertainty.json").read_text())
+    # widths 1 and 3: variances 1/12 and 9/12
+    indices = about["indices"]["sum"]["parameters"]
+    for name, part in (("k", 0.1), ("mu", 0.9)):
+        for kind in ("first", "total"):
+            assert abs(indices[name][kind] - part) < indices[name][f"{kind}_95"]
+    # those of the design itself, so run and row belong together
+    k, mu = read_study(file).points.T
+    assert indices == sobol_indices(k / 1.5e8 + 15.0 * mu, ["k", "mu"], 3)["parameters"]
+    band = about["bands"]["sum"]
+    assert (about["runs"], band["used"], band["missing"]) == (128, 64, 0)
+    assert abs(band["mean"] - (1.25 / 1.5 + 3.0)) < 3.0 * band["mean_se"]
+    assert band["sd"] == pytest.approx(math.sqrt(10.0 / 12.0), rel=0.05)
+    # how deep the ball goes is for the stiffness to say
+    depth = about["indices"]["depth"]["parameters"]
+    assert depth["k"]["total"] + depth["k"]["total_95"] > 0.95
+    assert abs(depth["mu"]["total"]) < 0.05
+    table = Responses(tmp_path / "ball" / "ball.parquet")
+    missing = int(np.isnan(table["late"]).sum())
+    assert missing > 0
+    assert f"no Sobol indices of late: {missing} of 128 runs have no value" in found.output
+    assert re.search(r"^depth +k +[01]\.\d+", found.output, re.MULTILINE)
 
 
 def free_port():
