@@ -1,7 +1,8 @@
 """Contacts of a run as frictional contact problems, for solvers of rigid contact: `--dump-fclib`.
 
-At the end of every N-th accepted step the problem of a time step h, that step's, is written as a
-local problem of FCLIB:
+MOREAU's steps solve such problems; those are written as they were solved
+(`stepping.contact_problem`). Of compliant contacts, at the end of every N-th accepted step, the
+problem of a time step h, that step's, is written as a local problem of FCLIB:
 
     u = W r + q,   W = H' T H,   q = H' (v + h a),
 
@@ -36,40 +37,31 @@ class ContactProblems:
 
     Parameters
     ----------
-    system
-        What runs.
+    name
+        The model's.
     every
         Steps from one problem to the next.
     folder
         Where files go, `<model>-i<step>-<contacts>.hdf5`; it must hold none, unless `resumed`.
-    evaluate
-        Evaluates the model at (t, y): afterwards `Scene.work` holds forces and contacts.
-    accelerate
-        Fills y' of bodies on joints from the forces in `Scene.work`: (t, y, dy).
+    make
+        Returns problem and guess of the step h that ends at (t, y), given as (t, h, y); None where
+        nothing touches.
     """
 
     def __init__(
         self,
-        system: System,
+        name: str,
         every: int,
         folder: Path,
-        evaluate: Callable[[float, Array], float],
-        accelerate: Callable[[float, Array, Array], None],
+        make: Callable[[float, float, Array], tuple[Any, Any] | None],
         resumed: bool,
     ) -> None:
-        self.system, self.every, self.folder = system, every, folder
-        self._evaluate, self._accelerate = evaluate, accelerate
+        self.name, self.every, self.folder = name, every, folder
+        self._make = make
         self.written, self.next = 0, every
         self._files: list[Path] = []
         if every < 1:
             raise ModelError(f"dump_fclib={every}: must be a whole number > 0")
-        for contact in system.model.contacts.values():
-            if contact.rigid:
-                # its equations would stand in W
-                raise ModelError(
-                    f"Force_Contact[{contact.id}]: dump_fclib does not go with "
-                    'tangential_stiffness="INFINITE"; leave that out for this run'
-                )
         try:
             folder.mkdir(parents=True, exist_ok=True)
             if not resumed and any(folder.glob("*.hdf5")):
@@ -85,13 +77,13 @@ class ContactProblems:
         if step < self.next:
             return
         self.next = step - step % self.every + self.every
-        made = self._problem(t, h, y)
+        made = self._make(t, h, y)
         if made is None:
             return
         from mbsim.fclib import hdf5
 
         problem, guess = made
-        name = f"{self.system.model.name}-i{step}-{problem.contacts}.hdf5"
+        name = f"{self.name}-i{step}-{problem.contacts}.hdf5"
         hdf5.write(self.folder / name, problem, guesses=[guess])
         self._files.append(self.folder / name)
         self.written += 1
@@ -102,7 +94,36 @@ class ContactProblems:
             file.unlink(missing_ok=True)
         self.written, self.next, self._files = 0, self.every, []
 
-    def _problem(self, t: float, h: float, y: Array) -> Any:
+
+class CompliantContacts:
+    """Makes problems of what compliant contacts touch at the end of a step.
+
+    Parameters
+    ----------
+    system
+        What runs.
+    evaluate
+        Evaluates the model at (t, y): afterwards `Scene.work` holds forces and contacts.
+    accelerate
+        Fills y' of bodies on joints from the forces in `Scene.work`: (t, y, dy).
+    """
+
+    def __init__(
+        self,
+        system: System,
+        evaluate: Callable[[float, Array], float],
+        accelerate: Callable[[float, Array, Array], None],
+    ) -> None:
+        self.system, self._evaluate, self._accelerate = system, evaluate, accelerate
+        for contact in system.model.contacts.values():
+            if contact.rigid:
+                # its equations would stand in W
+                raise ModelError(
+                    f"Force_Contact[{contact.id}]: dump_fclib does not go with "
+                    'tangential_stiffness="INFINITE"; leave that out for this run'
+                )
+
+    def problem(self, t: float, h: float, y: Array) -> Any:
         """Return the problem of a step h from a state, and what contacts do there as a guess."""
         from mbsim.fclib.problem import Info, Local, Solution, matrix
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -127,15 +127,27 @@ class Runner:
 
     def dump_every(self, every: int, resumed: bool) -> None:
         """Write the contact problem of every so many steps from here on."""
-        from mbsim.arrays.hooks import Joints
         from mbsim.integrators import scheme
         from mbsim.run.dumping import ContactProblems
 
         folder = self.recorder.directory
         if folder is None:
             raise ModelError("dump_fclib needs an output folder")
-        if self.methods.rigid is not None:
-            raise ModelError("dump_fclib writes problems of compliant contacts, not of MOREAU's")
+        self.dump = ContactProblems(
+            self.system.model.name, every, folder / "fclib", self._problems(), resumed
+        )
+        self.dump.next += int(self.method.counts[scheme.STEPS]) // every * every
+
+    def _problems(self) -> Callable[[float, float, Any], Any]:
+        """Return what makes contact problems of steps: (t, h, y), see `run.dumping`."""
+        from mbsim.arrays.hooks import Joints
+        from mbsim.run.dumping import CompliantContacts
+
+        rigid, name = self.methods.rigid, self.system.model.name
+        if rigid is not None:
+            from mbsim.stepping.contact_problem import contact_problem
+
+            return lambda t, h, y: contact_problem(rigid.stepping, name, t)
         idle = np.zeros(len(self.method.y))
 
         def evaluate(t: float, y: Any) -> float:
@@ -144,10 +156,7 @@ class Runner:
         def accelerate(t: float, y: Any, dy: Any) -> None:
             self.hooks.ask_joints(Joints.ACCELERATE, t, y, dy)
 
-        self.dump = ContactProblems(
-            self.system, every, folder / "fclib", evaluate, accelerate, resumed
-        )
-        self.dump.next += int(self.method.counts[scheme.STEPS]) // every * every
+        return CompliantContacts(self.system, evaluate, accelerate).problem
 
     def _dump(self) -> None:
         """Write the contact problem of the step taken last, where its turn has come."""

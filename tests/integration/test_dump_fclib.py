@@ -9,8 +9,9 @@ import pytest
 from click.testing import CliRunner
 
 import mbsim
-from helpers.decks import GROUND, sphere, write_deck
+from helpers.decks import EDGE, GRAVITY, GROUND, contact, cube, sphere, write_deck
 from helpers.folders import MODELS
+from helpers.rigid_decks import FIXED
 from mbsim.cli.main import main
 from mbsim.errors import ModelError, ResultsError
 from mbsim.fclib import hdf5
@@ -70,8 +71,7 @@ def test_a_ball_that_slides_has_its_matrix_in_closed_form(tmp_path):
     np.testing.assert_allclose(problem.W.csr().toarray(), wanted, rtol=1e-5, atol=1e-12)
 
 
-def test_joints_are_in_the_matrix(tmp_path):
-    model = f"""
+ROD = """
 <Body_Rigid id="1" isground="TRUE"/>
 <Reference_Marker id="10" body_id="1" pos_z="-0.09999"/>
 <Post_Graphic id="100" type="Plane" rm_id="10"/>
@@ -81,8 +81,11 @@ def test_joints_are_in_the_matrix(tmp_path):
 <Reference_Marker id="21" body_id="2" theta="1.5707963267948966"/>
 <Post_Graphic id="200" type="Sphere" center_marker_id="20" radius="0.1"/>
 <Constraint_Joint id="1" type="REVOLUTE" i_marker_id="21" j_marker_id="11"/>
-{CONTACT}"""
-    _, problems, _ = run(tmp_path, write_deck(tmp_path, model, 0.2))
+"""
+
+
+def test_joints_are_in_the_matrix(tmp_path):
+    _, problems, _ = run(tmp_path, write_deck(tmp_path, ROD + CONTACT, 0.2))
     W = problems[-1].problem.W.csr().toarray()
     # the rod turns about y: the normal has the arm 1, what lies along x 0.1, along y none
     wanted = np.array([1.0, 0.1**2, 0.0]) / 1.1
@@ -92,6 +95,60 @@ def test_joints_are_in_the_matrix(tmp_path):
     _, h = step_of(problems[-1])
     assert problems[-1].problem.q[0] == pytest.approx(-9.81 / 1.1 * h, rel=2e-3)
     assert solve(problems[-1].problem, tol=1e-10).status == "solved"
+
+
+RUBBED = {"cff_type": "STICTION", "mu_static": 0.5, "mu_dynamic": 0.4}
+
+
+@pytest.mark.parametrize("fixed", [True, False])
+def test_rigid_contacts_need_the_impulses_that_the_step_used(tmp_path, fixed):
+    """A ball slides, a box rests: where the step's own impulses are determined they are these."""
+    h = 1e-3
+    model = GROUND + sphere(0.1, v=(1.0, 0, 0)) + cube(3, (1.0, 0.0, 0.5 * EDGE)) + GRAVITY
+    model += contact(200, 100, 301, **RUBBED) + contact(300, 100, 302, **RUBBED)
+    deck = write_deck(tmp_path, model + (FIXED.format(h=h) if fixed else ""), 0.01, h)
+    # the step's own solver stops where a sweep changes less of a velocity than tol V
+    results, problems, files = run(tmp_path, deck, integrator="MOREAU", tol=1e-10)
+    assert files[0].name == "deck-i3-5.hdf5"
+    for k, contents in enumerate(problems):
+        problem, guess = contents.problem, contents.guesses[0]
+        t, step = step_of(contents)
+        assert problem.kind == "global"
+        assert problem.mu == pytest.approx([0.4, 0.5, 0.5, 0.5, 0.5])
+        found = solve(problem, tol=1e-12)
+        assert found.status == "solved"
+        np.testing.assert_allclose(found.r[:3], guess.r[:3], rtol=1e-9)
+        np.testing.assert_allclose(found.u, guess.u, atol=1e-10)
+        pressed = guess.r[3::3].sum()
+        assert found.r[3::3].sum() == pytest.approx(pressed, rel=1e-7)
+        assert pressed == pytest.approx(9.81 * step, rel=1e-7)
+        if fixed:
+            assert (t, step) == pytest.approx((3 * (k + 1) * h, h))
+            force = results["contacts/301/force"][3 * (k + 1)]
+            assert h * force[2] == pytest.approx(found.r[0], rel=1e-9)
+            assert h * np.hypot(*force[:2]) == pytest.approx(np.hypot(*found.r[1:3]), rel=1e-9)
+            assert np.hypot(*found.r[1:3]) == pytest.approx(0.4 * found.r[0], rel=1e-9)
+
+
+def test_joints_are_in_the_matrix_of_rigid_contacts_too(tmp_path):
+    h = 1e-3
+    model = ROD + contact(200, 100, 301) + GRAVITY + FIXED.format(h=h)
+    deck = write_deck(tmp_path, model, 0.02, h)
+    results, problems, files = run(tmp_path, deck, integrator="MOREAU", every=4)
+    at = [int(path.name.split("-i")[1].split("-")[0]) for path in files]
+    for k, contents in zip(at, problems, strict=True):
+        assert contents.problem.kind == "local"
+        found = solve(contents.problem, tol=1e-12)
+        assert found.status == "solved"
+        assert found.r[0] == pytest.approx(h * results["contacts/301/force"][k, 2], rel=1e-9)
+    last = problems[-1]
+    W = last.problem.W.csr().toarray()
+    # which of the tangential directions is the rod's is for the point to say
+    assert W[0, 0] == pytest.approx(1.0 / 1.1, rel=1e-3)
+    np.testing.assert_allclose(
+        np.linalg.eigvalsh(W[1:, 1:]), [0.0, 0.1**2 / 1.1], rtol=2e-3, atol=1e-12
+    )
+    assert last.guesses[0].r[0] == pytest.approx(9.81 * h, rel=2e-3)
 
 
 def test_the_run_is_the_same_with_and_without(tmp_path):
