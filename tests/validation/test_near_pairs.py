@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import mbsim
 from helpers.decks import COULOMB, GRAVITY, GROUND, run_deck, write_deck
@@ -23,6 +24,7 @@ from mbsim.arrays.codes import ACTIVE, FREE, LISTINGS, WANTED
 from mbsim.compile_model import build, contacts, pairing
 from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics
 from mbsim.dynamics.contact import broadphase as contact_set
+from mbsim.dynamics.events import step_limits
 from mbsim.errors import Interrupted, ModelError, SolverError
 
 MOVING_PLANE = """<Body_Rigid id="9000" cg_id="90000" mass="1" inertia_xx="1" inertia_yy="1"
@@ -244,6 +246,29 @@ def test_a_plane_that_spins_about_its_normal_or_slides_along_itself_stays(
         y[plane : plane + 3] = system.y0[plane : plane + 3] + 10.0 * angle * along
         place_bodies(scene, y)
         assert place_graphics(scene, y)
+
+
+def test_the_speed_of_a_plane_is_that_of_its_way_however_it_stands(tmp_path, all_by_broadphase):
+    random = np.random.default_rng(11)
+    text, ids = mixed(random, ("SPHERE",), 30, 0.5)
+    system = listed(tmp_path, GROUND + text + MOVING_PLANE + sets(ids, [900000], **LAW))
+    scene, g = system.scene, system.graphic_ids.index(900000)
+    at = 13 * (len(scene.bodies.mass) - 1)
+    h, lever = 1e-6, scene.broadphase.lever[g]
+    for _ in range(12):
+        y, x, v, w = system.y0.copy(), *random.normal(size=(3, 3))
+        stands, frames = Rotation.random(random_state=random), []
+        # the spin of a state is along the body's own axes
+        for t in (-0.5 * h, 0.5 * h, 0.0):
+            q = (stands * Rotation.from_rotvec(t * w)).as_quat()
+            y[at : at + 13] = [*(x + t * v), q[3], *q[:3], *v, *w]
+            place_bodies(scene, y)
+            place_graphics(scene, y)
+            frames.append(scene.work.frames[g].copy())
+        change = (frames[1] - frames[0]) / h
+        n = [5, 8, 11]
+        way = abs(frames[2][n] @ change[:3]) + lever * np.linalg.norm(change[n])
+        assert step_limits.plane_speed(scene, y, g) == pytest.approx(way, rel=1e-6)
 
 
 def test_too_few_places_halve_the_skin(tmp_path, all_by_broadphase, monkeypatch):

@@ -267,10 +267,11 @@ def step_to_touch(scene: Scene, y: F1, f: F1, pair: int, h: float) -> float:
 @jitable
 def plane_speed(scene: Scene, y: F1, g: int) -> float:
     """Return how fast plane g comes towards points at its lever's distance, see `plane_travel`."""
-    frame, at = scene.work.frames[g], BODY_SIZE * scene.graphics.body[g]
+    frame, b = scene.work.frames[g], scene.graphics.body[g]
     n = (frame[5], frame[8], frame[11])
-    turning = cross(vector(y[at + AT_W :]), n)
-    v = velocity_at(scene, y, scene.graphics.body[g], vector(frame))
+    # both along global axes: the spin in the state is along the body's own
+    turning = cross(vector(scene.work.w[b]), n)
+    v = velocity_at(scene, y, b, vector(frame))
     return abs(dot(n, v)) + norm(turning) * scene.broadphase.lever[g]
 
 
