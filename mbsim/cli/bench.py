@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from mbsim.bench.runner import Options, Report
 
 
+#: CPU time that a case of stress may take, s.
+LONGEST = 60.0
+
+
 def _numbers(ctx: click.Context, parameter: click.Parameter, value: str | None) -> list[float]:
     """Return a list of numbers separated by commas."""
     try:
@@ -56,6 +60,11 @@ def _numbers(ctx: click.Context, parameter: click.Parameter, value: str | None) 
     "those above 2 s not at all.",
 )
 @click.option("--no-peers", is_flag=True, help="Run only mbsim, whatever is installed.")
+@click.option(
+    "--stress",
+    is_flag=True,
+    help="Run decks at the ends of what may be asked for instead, SCENE being a family of them.",
+)
 @json_option("all numbers as one JSON object")
 def command(
     scenes: tuple[str, ...],
@@ -64,12 +73,17 @@ def command(
     integrators: tuple[str, ...],
     repeats: int,
     no_peers: bool,
+    stress: bool,
     as_json: bool,
 ) -> None:
     """Run SCENEs (default: all) here and on the peers that are installed.
 
-    Writes DIR/bench.csv, bench.md and, with matplotlib, one PNG a scene.
+    Writes DIR/bench.csv, bench.md and, with matplotlib, one PNG a scene; with --stress
+    DIR/stress.csv and stress.md.
     """
+    if stress:
+        _stress(scenes, output, tolerances, integrators, as_json)
+        return
     from mbsim.bench import peers, plot, report, runner
     from mbsim.cli.messages import print_json
 
@@ -94,6 +108,38 @@ def command(
     else:
         echo(text, nl=False)
     _say(f"{len(done.rows)} measurements in {output / 'bench.csv'}")
+
+
+def _stress(
+    families: tuple[str, ...],
+    output: Path,
+    tolerances: list[float],
+    integrators: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    """Run the cases of stress; exit code 1 where one ends as it may not."""
+    import os
+
+    from mbsim.bench import report, runner
+    from mbsim.bench.machine import describe
+    from mbsim.bench.stress import Asked, chosen, judge, table, workers
+    from mbsim.cli.messages import print_json
+
+    asked = Asked(families, runner.choose_integrators(integrators), tolerances)
+    cases, verdicts = chosen(asked), []
+    report.write_text(output / "stress.csv", "")
+    for found in workers.verdicts(cases, asked, os.cpu_count() or 1, LONGEST):
+        verdicts.append(found)
+        _say(f"[{len(verdicts)}/{len(cases)}] {table.line(found)[2:]}")
+    table.write_csv(output / "stress.csv", describe(), verdicts)
+    text = table.markdown(verdicts)
+    report.write_text(output / "stress.md", text)
+    if as_json:
+        print_json([found._asdict() for found in verdicts])
+    else:
+        echo(text, nl=False)
+    if any(found.ended in judge.FAULTS for found in verdicts):
+        raise SystemExit(1)
 
 
 def _say(text: str) -> None:
