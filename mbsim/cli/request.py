@@ -9,13 +9,14 @@ from typing import Any
 
 import click
 
+from mbsim.cli.completion import request_names
 from mbsim.cli.messages import counted, echo
 from mbsim.cli.options import json_option
 
 
 @click.command("request")
 @click.argument("result", type=click.Path(path_type=Path), metavar="RESULT.h5")
-@click.argument("names", nargs=-1, required=True, metavar="NAME...")
+@click.argument("names", nargs=-1, required=True, metavar="NAME...", shell_complete=request_names)
 @click.option(
     "-o",
     "output",

@@ -9,6 +9,7 @@ import shutil
 
 import numpy as np
 import pytest
+from click.shell_completion import ShellComplete
 from click.testing import CliRunner
 
 import mbsim
@@ -289,3 +290,22 @@ def test_rows_after_a_command_have_the_changed_parameters(tmp_path):
         rows = same(results)
     mu = {round(row.incidents[301][0]["mu"], 3) for row in rows if row.incidents[301]}
     assert {0.1, 0.3} <= mu
+
+
+def test_a_shell_completes_what_can_be_asked_of_a_result(held):
+    file, _ = held
+    shell = ShellComplete(main, {}, "mbsim", "_MBSIM_COMPLETE")
+
+    def completed(word):
+        return [item.value for item in shell.get_completions(["request", str(file)], word)]
+
+    assert completed("Force") == ["Force_Contact[301]."]
+    for part in ("force", "force/", "area", "incident[0]."):
+        assert f"Force_Contact[301].{part}" in completed("Force_Contact[301].")
+    assert completed("Force_Contact[301].incident[0].mu") == ["Force_Contact[301].incident[0].mu"]
+    asked = [
+        *completed("Force_Contact[301].force/"),
+        *completed("Force_Contact[301].incident[0].n"),
+    ]
+    assert len(asked) > 5
+    assert ask(file, *(name for name in asked if not name.endswith("/"))).exit_code == 0
