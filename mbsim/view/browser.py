@@ -14,6 +14,7 @@ import shutil
 import socket
 import struct
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -205,6 +206,15 @@ class Page:
         self._socket.close()
 
 
+def _end_with_parent() -> None:
+    """Have Linux end this process when the one that started it ends, however that ends."""
+    import ctypes
+    import signal
+
+    set_death_signal = 1  # PR_SET_PDEATHSIG of prctl(2); exec keeps it
+    ctypes.CDLL(None).prctl(set_death_signal, signal.SIGKILL)
+
+
 @contextlib.contextmanager
 def opened_page(width: int = 1280, height: int = 800) -> Iterator[Page]:
     """Start the browser with a profile of its own, and yield its page; it ends afterwards."""
@@ -218,6 +228,7 @@ def opened_page(width: int = 1280, height: int = 800) -> Iterator[Page]:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             start_new_session=True,
+            preexec_fn=_end_with_parent if sys.platform == "linux" else None,
         )
         try:
             page = Page(_address(process, Path(folder)))

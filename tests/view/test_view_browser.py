@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import base64
 import io
+import os
+import select
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -271,3 +275,43 @@ def test_a_report_is_shown_and_printed(window, file, tmp_path):
     assert printed[:5] == b"%PDF-"
     assert printed.count(b"/Type /Page\n") + printed.count(b"/Type /Page ") >= 2
     assert complaints(window) == []
+
+
+HOLDS = """
+from mbsim.view.browser import opened_page
+with opened_page() as page:
+    print(page.run("1 + 1"), flush=True)
+    input()
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc, as Linux has it")
+def test_a_browser_ends_with_a_python_that_was_killed(tmp_path):
+    holder = subprocess.Popen(
+        [sys.executable, "-c", HOLDS],
+        env=os.environ | {"TMPDIR": str(tmp_path)},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert holder.stdout.readline() == "2\n"
+    browsers = []
+    for entry in Path("/proc").iterdir():
+        # its profile is the only thing in that folder
+        if entry.name.isdecimal() and f"--user-data-dir={tmp_path}" in words_of(entry):
+            browsers.append(os.pidfd_open(int(entry.name)))
+    assert browsers
+    holder.kill()
+    holder.communicate()
+    for browser in browsers:
+        ended, _, _ = select.select([browser], [], [], 30.0)
+        os.close(browser)
+        assert ended
+
+
+def words_of(entry):
+    """Return the command line of a process, nothing where it has ended."""
+    try:
+        return (entry / "cmdline").read_bytes().decode(errors="replace")
+    except OSError:
+        return ""
