@@ -51,7 +51,7 @@ class Model:
     Parameters
     ----------
     deck : path-like, text or file, optional
-        An XML deck to begin with; its comments are not kept.
+        An XML deck to begin with; its comments are kept.
     name : str, optional
         What result files are called, and how messages name the model.
     """
@@ -78,6 +78,8 @@ class Model:
             own = self._sections[section.key]
             own.attributes += section.attributes
             own.children += section.children
+            own.comments += section.comments
+            own.last_comments += section.last_comments
             for node in section.children:
                 self._places[id(node)] = (file, node.line)
         for node in self._sections["model"].children:
@@ -270,8 +272,12 @@ class Model:
         for section in self._sections.values():
             if not section.children:
                 continue
+            lines += _said(section.comments, "  ")
             lines.append((f"  <{section.tag}{_attributes(section)}>", None))
-            lines += [(f"    {_element(node)}", node) for node in section.children]
+            for node in section.children:
+                lines += _said(node.comments, "    ")
+                lines.append((f"    {_element(node)}", node))
+            lines += _said(section.last_comments, "    ")
             lines.append((f"  </{section.tag}>", None))
         return [*lines, ("</MotionSolve>", None)]
 
@@ -324,6 +330,11 @@ def _caller() -> tuple[str, int]:
 
 def _attributes(node: Node) -> str:
     return "".join(f" {each.name}={quoteattr(each.value)}" for each in node.attributes)
+
+
+def _said(comments: Sequence[str], indent: str) -> list[tuple[str, Node | None]]:
+    """Return comments line by line."""
+    return [(line, None) for text in comments for line in f"{indent}<!--{text}-->".splitlines()]
 
 
 def _element(node: Node) -> str:

@@ -58,13 +58,19 @@ class Attribute:
 
 @dataclass(slots=True)
 class Node:
-    """One element: `tag` as written, attributes in order, `text` without that of its children."""
+    """One element: `tag` as written, attributes in order, `text` without that of its children.
+
+    `comments` are those between what stands before it and its tag, `last_comments` those between
+    its last child and its end.
+    """
 
     tag: str
     line: int
     attributes: list[Attribute] = field(default_factory=list)
     text: str = ""
     children: list[Node] = field(default_factory=list)
+    comments: tuple[str, ...] = ()
+    last_comments: tuple[str, ...] = ()
 
     @property
     def key(self) -> str:
@@ -195,9 +201,22 @@ def _to_nodes(root: etree._Element, text: str, file: str) -> Node:
             text_of += "".join(child.tail or "" for child in element)
         tag = element.tag.rpartition("}")[2]
         node = Node(tag, line, attributes, text_of and text_of.strip())
+        node.comments = _comments(element.itersiblings(preceding=True))
+        node.last_comments = _comments(element.iterchildren(reversed=True))
         above[-1].children.append(node)
         above.append(node)
     return top.children[0]
+
+
+def _comments(nodes: Iterator[etree._Element]) -> tuple[str, ...]:
+    """Return the comments before the first element of `nodes`, in the order of the text."""
+    found: list[str] = []
+    for node in nodes:
+        if isinstance(node, etree._Comment):
+            found.append(node.text or "")
+        elif not isinstance(node, etree._ProcessingInstruction):
+            break
+    return tuple(reversed(found))
 
 
 def _tag_lines(text: str) -> Iterator[tuple[int, dict[str, int]]]:

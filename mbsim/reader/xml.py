@@ -217,14 +217,20 @@ def _read_bytes(path: Path) -> bytes:
 
 
 def read_sections(deck: Given) -> tuple[str, list[Node]]:
-    """Return what an XML deck is called, and its <Model> and <Command> parts as they stand."""
+    """Return what an XML deck is called, and its <Model> and <Command> parts as they stand.
+
+    The first has the comments at the deck's head too.
+    """
     name, data = _given(deck)
     if is_adams(Path(name).name):
         raise ModelError(f"{name}: an Adams deck; only XML can be gone on with")
     draft = Draft(str(name), Path(name).absolute().parent)
-    sections = list(_find_sections(parse(data, draft.file), draft))
+    root = parse(data, draft.file)
+    sections = list(_find_sections(root, draft))
     if draft.faults:
         raise DeckError(draft.faults)
+    if sections and sections[0] is not root:
+        sections[0].comments = root.comments + sections[0].comments
     return str(name), sections
 
 

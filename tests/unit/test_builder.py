@@ -237,3 +237,49 @@ def test_faults_of_the_whole_name_the_line_of_the_script():
 def test_what_must_be_given_may_be_given_without_names():
     assert required(calls()["joint"]) == ["type", "i_marker_id", "j_marker_id"]
     assert required(calls()["contact"]) == ["i_graphics_id", "j_graphics_id", "cnf_type"]
+
+
+COMMENTED = """<?xml version="1.0"?>
+<!-- who wrote it -->
+<!-- and why:
+     on two lines -->
+<MotionSolve>
+  <!-- the model -->
+  <Model>
+    <!-- the ground -->
+    <Body_Rigid id="1" isground="TRUE"/>
+    <!-- weight & all -->
+    <!-- on Earth -->
+    <Force_Gravity grav_z="-9.81"/> <!-- no more -->
+  </Model>
+  <Command>
+    <Simulate analysis_type="Transient" end_time="1" print_interval="0.1"/>
+    <!-- the end -->
+  </Command>
+</MotionSolve>
+"""
+
+
+def test_comments_of_a_deck_stay_where_they_are():
+    model = mbsim.Model(COMMENTED)
+    model.body(mass=3.5, inertia=(1.0, 1.0, 1.0))
+    text = model.to_xml()
+    order = [
+        *("<MotionSolve>", "<!-- who wrote it -->", "<!-- and why:", "on two lines -->"),
+        *("<!-- the model -->", "<Model>", "<!-- the ground -->", "<Body_Rigid"),
+        *("<!-- weight & all -->", "<!-- on Earth -->", "<Force_Gravity", "3.5"),
+        *("<!-- no more -->", "</Model>", "<Command>", "<Simulate", "<!-- the end -->"),
+    ]
+    places = [text.index(each) for each in order]
+    assert places == sorted(places)
+    assert text.count("<!--") == COMMENTED.count("<!--")
+    # and no more come with every time
+    assert mbsim.Model(text).to_xml() == text
+
+
+def test_faults_below_comments_name_the_line_of_the_script():
+    model = mbsim.Model(COMMENTED)
+    model.motion_joint(joint_id=77, val_type="D", expr="TIME")
+    with pytest.raises(DeckError, match="77") as caught:
+        mbsim.read_model(model)
+    assert caught.value.faults[0].file == __file__
