@@ -2,8 +2,8 @@
 // What a scene is seen by: renderer, light, ground, camera.
 mbsim.Stage = (function () {
   const THEMES = {
-    light: { top: 0xf4f6f9, bottom: 0xdfe5ec, paper: 0xf0f2f5, ink: 0x7d8996, ambient: 0.55, key: 2.1 },
-    dark: { top: 0x1b2128, bottom: 0x0e1216, paper: 0x3a444f, ink: 0x7d8b99, ambient: 0.5, key: 1.7 },
+    light: { top: 0xf4f6f9, bottom: 0xdfe5ec, paper: 0xf0f2f5, ink: 0x7d8996, ambient: 2.3, below: 0xb8b4ac, key: 2.2 },
+    dark: { top: 0x1b2128, bottom: 0x0e1216, paper: 0x3a444f, ink: 0x7d8b99, ambient: 2.6, below: 0xa09c94, key: 2.2 },
   };
 
   // A round number of 1, 2 or 5 times a power of ten below a value.
@@ -94,13 +94,14 @@ mbsim.Stage = (function () {
       this.renderer.toneMapping = THREE.NeutralToneMapping;
       this.renderer.toneMappingExposure = 1.05;
       this.scene = new THREE.Scene();
-      const room = new THREE.PMREMGenerator(this.renderer);
-      this.scene.environment = room.fromScene(new THREE.RoomEnvironment(), 0.04).texture;
+      // light from all around by a formula: a map of surroundings takes seconds where a processor draws
+      this.sky = new THREE.HemisphereLight(0xffffff, 0xffffff, 1);
+      this.sky.position.set(...run.about.up);
       this.sun = new THREE.DirectionalLight(0xffffff, 2);
       this.sun.castShadow = true;
       this.sun.shadow.mapSize.set(2048, 2048);
       this.sun.shadow.radius = 3;
-      this.scene.add(this.sun, this.sun.target);
+      this.scene.add(this.sky, this.sun, this.sun.target);
       this.camera = new THREE.PerspectiveCamera(32, 1, 0.01, 100);
       this.up = run.about.up;
       this.camera.up.set(...this.up);
@@ -165,7 +166,8 @@ mbsim.Stage = (function () {
     setTheme(name) {
       const theme = THEMES[name];
       this.scene.background = new THREE.Color(theme.bottom).lerp(new THREE.Color(theme.top), 0.6);
-      this.scene.environmentIntensity = theme.ambient;
+      this.sky.intensity = theme.ambient;
+      this.sky.groundColor.set(theme.below);
       this.sun.intensity = theme.key;
       for (const floor of this.floors) {
         floor.material.color.set(theme.paper);

@@ -1,10 +1,9 @@
 // What `three.min.js` is made of: see the manual's page on pages of results (develop/view).
 export {
   BoxGeometry, BufferAttribute, BufferGeometry, Color, ConeGeometry, CylinderGeometry, DirectionalLight,
-  DoubleSide, DynamicDrawUsage, Float32BufferAttribute, Group, InstancedMesh, Line, LineBasicMaterial,
+  DoubleSide, DynamicDrawUsage, Float32BufferAttribute, Group, HemisphereLight, InstancedMesh, Line, LineBasicMaterial,
   LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshStandardMaterial, NeutralToneMapping, PCFShadowMap,
-  PMREMGenerator, PerspectiveCamera, Quaternion, REVISION, Raycaster, Scene, SphereGeometry, Vector2, Vector3,
+  PerspectiveCamera, Quaternion, REVISION, Raycaster, Scene, SphereGeometry, Vector2, Vector3,
   WebGLRenderer,
 } from "three";
 export { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-export { RoomEnvironment } from "three/examples/jsm/environments/RoomEnvironment.js";
