@@ -33,6 +33,8 @@ class Motion(NamedTuple):
         (n, bodies, 3, 3): body to global axes.
     kinetic, weight
         (n,) J: 1/2 m v^2 + 1/2 w.I w, and -m g.x, from these rows and the deck alone.
+    load
+        Weight of all bodies, N.
     """
 
     time: np.ndarray
@@ -42,6 +44,7 @@ class Motion(NamedTuple):
     R: np.ndarray
     kinetic: np.ndarray
     weight: np.ndarray
+    load: float
 
     @property
     def energy(self) -> np.ndarray:
