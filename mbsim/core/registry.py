@@ -21,12 +21,14 @@ class Registry(Generic[Entry]):
         self._key = key
         self._entries: dict[str, Entry] = {}
         self._loaded = False
+        self._names: tuple[str, ...] = ()
 
     def put(self, name: str, entry: Entry) -> None:
         """Add `entry`; a name taken twice is a programming error."""
         if name in self._entries:
             raise ValueError(f"{name} is registered twice in {self._package}")
         self._entries[name] = entry
+        self._names = ()
 
     def _load(self) -> None:
         """Import every module of the package, so that each registers itself."""
@@ -46,4 +48,7 @@ class Registry(Generic[Entry]):
 
     def __iter__(self) -> Iterator[str]:
         self._load()
-        return iter(sorted(self._entries, key=lambda name: (self._key(self._entries[name]), name)))
+        if not self._names:
+            entries = self._entries
+            self._names = tuple(sorted(entries, key=lambda name: (self._key(entries[name]), name)))
+        return iter(self._names)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
+import os
 import re
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -190,18 +191,23 @@ def _digest(file: Path, stamp: tuple[int, ...]) -> str:
 def _files(file: Path) -> list[Path]:
     """Return a user's file and those beside it that it names: scripts import their neighbours."""
     found, waiting = {file}, [file]
+    beside: dict[Path, set[str]] = {}
     while waiting:
         one = waiting.pop()
-        if one.suffix not in (".py", ".m"):
+        ending, home = one.suffix, one.parent
+        if ending not in (".py", ".m"):
             continue
-        for word in _words(one, _stamp(one)):
-            folder = one.parent / word
-            near = folder.with_name(word + one.suffix)
-            named = [near] if near.is_file() else []
-            if one.suffix == ".py" and folder.is_dir():
-                named += folder.rglob("*.py")
-            waiting += [other for other in named if other not in found]
-            found.update(named)
+        # a look at the folder, and not one for every word of a script
+        if home not in beside:
+            beside[home] = set(os.listdir(home))
+        words = _words(one, _stamp(one))
+        named = [home / f"{word}{ending}" for word in words if f"{word}{ending}" in beside[home]]
+        named = [file for file in named if file.is_file()]
+        if ending == ".py":
+            for word in words & beside[home]:
+                named += (home / word).rglob("*.py")  # of a file there is nothing
+        waiting += [other for other in named if other not in found]
+        found.update(named)
     return sorted(found)
 
 
@@ -226,6 +232,7 @@ def of_users(system: System) -> dict[str, Any]:
     return facts
 
 
+@functools.cache
 def of_checkpoint() -> dict[str, str]:
     """Return the form of a checkpoint, and type and number of axes of its arrays by name."""
     groups = {"": Scene, "method/": Method, "tangent/": Tangent}

@@ -177,11 +177,11 @@ class Recorder:
         rows = max(0.0, rows - self._written[0])  # those of a run that goes on are there
         tables = (table for _, table in self._signals(nothing(self.system)))
         size = sum(table.itemsize * math.prod(table.shape[1:]) for table in tables)
+        memory = free_memory()
         if self._target is None:
-            place, free = "in memory", free_memory()
+            place, free = "in memory", memory
         else:
             place, free = f"in {self.directory}", self._store.room()
-        memory = free_memory()
         if memory is not None and rows * TIME_BYTES > memory:
             # the times themselves are kept in memory
             size, place, free = TIME_BYTES, "in memory", memory

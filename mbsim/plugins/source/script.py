@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import importlib.util
 import inspect
 import itertools
@@ -122,7 +123,7 @@ def load_script(path: Path, element: str, scripts: Scripts) -> Script:
             code = _bytecode(data, path, element)
         else:
             text = importlib.util.decode_source(data)
-            code = compile(text, str(path), "exec", dont_inherit=True)
+            code = _compiled(text, str(path))
     except (SyntaxError, ValueError, UnicodeDecodeError) as error:
         raise ModelError(f"{element}: {diagnose(data, str(path), error)}") from None
     if text is not None:
@@ -130,6 +131,12 @@ def load_script(path: Path, element: str, scripts: Scripts) -> Script:
         linecache.cache[str(path)] = (len(data), None, text.splitlines(True), str(path))
     scripts[path] = Script(path, text, _run(code, path, element))
     return scripts[path]
+
+
+@functools.lru_cache(maxsize=256)
+def _compiled(text: str, file: str) -> types.CodeType:
+    """Return the code of a script: a process that runs a model many times compiles it once."""
+    return compile(text, file, "exec", dont_inherit=True)
 
 
 def _bytecode(data: bytes, path: Path, element: str) -> types.CodeType:
