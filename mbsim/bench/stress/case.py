@@ -35,6 +35,8 @@ class Motion(NamedTuple):
         (n,) J: 1/2 m v^2 + 1/2 w.I w, and -m g.x, from these rows and the deck alone.
     load
         Weight of all bodies, N.
+    steps
+        How many it took.
     """
 
     time: np.ndarray
@@ -45,6 +47,11 @@ class Motion(NamedTuple):
     kinetic: np.ndarray
     weight: np.ndarray
     load: float
+    steps: int
+
+    def errors(self, tol: float) -> float:
+        """Return what steps leave that are each right to tol, over what moves."""
+        return (10.0 + self.steps) * tol
 
     @property
     def energy(self) -> np.ndarray:

@@ -304,7 +304,7 @@ def at_once() -> Iterator[Deck]:
         # all masses are equal, and nothing is outside
         total = motion.v.sum(axis=1)
         off = np.linalg.norm(total - total[0], axis=-1).max() / np.linalg.norm(total[0])
-        return {"momentum": (float(off), 10.0 * tol)}
+        return {"momentum": (float(off), motion.errors(tol))}
 
     for e in (1.0, 1.5):
         for gap in (0.0, 1e-4):

@@ -135,14 +135,13 @@ def _gave_up(case: Case, folder: Path, said: str, seconds: float) -> Verdict:
 
 def _judged(case: Case, results: Results, told: list[str], seconds: float) -> Verdict:
     """Return the verdict of a run that finished."""
-    steps = int(results.stats["steps"])
     motion = motion_of(case.deck.text, results)
-    if not all(np.isfinite(rows).all() for rows in motion[:-1]):
-        return verdict(case, NAN, "rows", steps=steps, seconds=seconds)
+    if not all(np.isfinite(rows).all() for rows in motion):
+        return verdict(case, NAN, "rows", steps=motion.steps, seconds=seconds)
     measures = case.deck.check(motion, case.tol) if case.deck.check else {}
     if not case.deck.driven:
         moved = motion.size + case.deck.stored
-        allowed = min(OF_ENERGY, OF_TOL * case.tol * np.sqrt(steps) + ROUNDING) * moved
+        allowed = min(OF_ENERGY, OF_TOL * case.tol * np.sqrt(motion.steps) + ROUNDING) * moved
         # a place is right to tol times a length: the weight of what rests makes energy of it
         allowed += 10.0 * case.tol * motion.load * np.abs(motion.x).max()
         gained = float((motion.energy - motion.energy[0]).max()) - case.deck.stored
@@ -155,7 +154,7 @@ def _judged(case: Case, results: Results, told: list[str], seconds: float) -> Ve
     ended = RIGHT if worst <= 1.0 else SILENT
     if told:
         ended, reason = TOLD, "; ".join(filter(None, (told[0], reason)))
-    return verdict(case, ended, reason, worst=worst, steps=steps, seconds=seconds)
+    return verdict(case, ended, reason, worst=worst, steps=motion.steps, seconds=seconds)
 
 
 def motion_of(text: str, results: Results) -> Motion:
@@ -182,8 +181,9 @@ def motion_of(text: str, results: Results) -> Motion:
     R = _rotations(q)
     own = np.einsum("nbji,nbj->nbi", R, w)
     kinetic = 0.5 * ((v**2).sum(axis=-1) @ mass + (inertia * own**2).sum(axis=(-2, -1)))
+    steps = int(results.stats["steps"])
     load = float(mass.sum() * np.linalg.norm(pull))
-    return Motion(results["time"], x, v, w, R, kinetic, -(x @ pull) @ mass, load)
+    return Motion(results["time"], x, v, w, R, kinetic, -(x @ pull) @ mass, load, steps)
 
 
 def _rotations(q: np.ndarray) -> np.ndarray:

@@ -17,7 +17,7 @@ ABOUT_Y = ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0))
 def keeps_energy(motion: Motion, tol: float) -> Measures:
     """Compare the energy with that of the start."""
     off = np.abs(motion.energy - motion.energy[0]).max() / motion.size
-    return {"energy": (float(off), min(0.02, 30.0 * tol))}
+    return {"energy": (float(off), min(0.02, 3.0 * motion.errors(tol)))}
 
 
 def spring(number: int, i: int, j: int, k: float, length: float) -> str:
@@ -43,7 +43,7 @@ def springs() -> Iterator[Deck]:
                 turn = (rate * motion.time)[:, None]
                 exact = start * np.cos(turn) + speed / rate * np.sin(turn)
                 off = np.linalg.norm(motion.x[:, 0] - exact, axis=-1).max() / 0.1
-                return {"place": (float(off), 10.0 * tol)}
+                return {"place": (float(off), motion.errors(tol))}
 
             statements = [
                 text.GROUND,
@@ -86,7 +86,7 @@ def spinning() -> Iterator[Deck]:
         momentum = np.einsum("nab,nb->na", motion.R[:, 0], inertia * body)
         size = np.linalg.norm(momentum[0])
         off = np.linalg.norm(momentum - momentum[0], axis=-1).max() / size
-        return {"angular momentum": (float(off), min(0.02, 10.0 * tol))}
+        return {"angular momentum": (float(off), min(0.02, motion.errors(tol)))}
 
     for spin in ((1e4, 1.0, 0.0), (1.0, 1e4, 1.0), (6e3, 5e3, 6e3)):
         statements = [text.GROUND, text.body(2, 1.0, (1.0, 2.0, 2.5), spin=spin)]
