@@ -42,11 +42,12 @@ def slide(rng, writer):
     writer.add("Post_Graphic", id=100, type="Plane", rm_id=100)
     flat = SIZE * float(rng.uniform(0.2, 0.5))
     kind = str(rng.choice(["BoxDefinedFromCenter", "Cylinder"]))
-    # the middle of a box and of a cylinder are half its height above the plane it stands on
+    # it stands on the plane; a cylinder's marker is in the middle of its end face
     writer.marker(20, 2, (0.0, 0.0, flat))
+    writer.marker(21, 2, (0.0, 0.0, 0.0))
     turn = (0.0, 0.0, float(rng.normal(scale=3.0)))
     writer.body(2, mass, inertia_of(rng, mass), (float(rng.normal(scale=0.5)), 0.1, 0.0), turn)
-    facts = {"id": 200, "type": kind, "center_marker_id": 20}
+    facts = {"id": 200, "type": kind, "center_marker_id": 21 if kind == "Cylinder" else 20}
     if kind == "Cylinder":
         facts |= {"radius": writer.length(SIZE), "length": writer.length(2.0 * flat)}
     else:
