@@ -233,13 +233,18 @@ def of_users(system: System) -> dict[str, Any]:
 
 
 @functools.cache
-def of_checkpoint() -> dict[str, str]:
-    """Return the form of a checkpoint, and type and number of axes of its arrays by name."""
+def _layouts() -> dict[str, str]:
+    """Return type and number of axes of the arrays of a checkpoint by name."""
     groups = {"": Scene, "method/": Method, "tangent/": Tangent}
-    found = {"form": str(CHECKPOINT)}
+    found: dict[str, str] = {}
     for path, group in groups.items():
         found |= tags.layout(group, tags.STATE, path)
     return found
+
+
+def of_checkpoint() -> dict[str, str]:
+    """Return the form of a checkpoint, and type and number of axes of its arrays by name."""
+    return {"form": str(CHECKPOINT)} | _layouts()
 
 
 class Identity:
