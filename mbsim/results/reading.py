@@ -51,7 +51,7 @@ _LISTS = ("columns", "measures")
 #: Groups of other things than elements.
 _NO_ELEMENTS = ("checkpoint", "stats", "audit", "state", "energy", "requests", "graphics")
 #: Datasets that are no signals, whatever their shapes.
-_NO_SIGNALS = ("state/", "contact_points/", "errors/")
+_NO_SIGNALS = ("state/", "contact_points/", "errors/", "sensitivity/")
 #: What `keys` leaves out: what a run goes on from, and what pictures are made of.
 _NO_KEYS = ("checkpoint/", "graphics/", "markers", "connections")
 
@@ -241,6 +241,37 @@ class Results(SignalMapping):
     def errors(self) -> Errors:
         """Error bars of a run with ``verify``; names as those of signals."""
         return Errors(self)
+
+    def sensitivity(self, name: str, parameter: str) -> Any:
+        """Return the derivative of a signal with respect to a parameter of the deck.
+
+        Parameters
+        ----------
+        name : str
+            Of the signal, as `results[...]` takes it.
+        parameter : str
+            One of those that the run was asked for: ``Force_Contact[301].mu_dynamic``.
+
+        Returns
+        -------
+        ndarray
+            Of the signal's shape; NaN from where it is not known any more.
+
+        Raises
+        ------
+        UnknownSignal
+            If the run has no such derivative.
+        """
+        from mbsim.results.sensitivities import derivative
+
+        return derivative(self, name, parameter)
+
+    @property
+    @reads
+    def parameters(self) -> dict[str, dict[str, Any]]:
+        """Parameters of which there are sensitivities: value, time until which they are known."""
+        group = self._open().get("sensitivity")
+        return {} if group is None else {name: facts_of(item) for name, item in group.items()}
 
     def find(self, name: str) -> list[str]:
         """Return the names of signals that a name stands for; a plain one stands for itself.

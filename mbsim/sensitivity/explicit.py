@@ -1,0 +1,70 @@
+"""The derivative of a step of an explicit method: of what it computes, with its step held.
+
+That is the same method's step for the variational equations D' = f_y D + f_p.
+Source: H. G. Bock, in Modelling of Chemical Reaction Systems, Springer (1981) 102 (internal
+numerical differentiation).
+"""
+
+from __future__ import annotations
+
+from mbsim.arrays.scene import Scene
+from mbsim.core.address import call_int, view
+from mbsim.core.jitable import jitable
+from mbsim.integrators.scheme import SHOWN, Method, in_workspace
+from mbsim.sensitivity.arrays import (
+    ATTEMPT,
+    DOWN,
+    FIT_DENSE,
+    REMEMBERED,
+    TWIN,
+    UP,
+    Variations,
+)
+from mbsim.sensitivity.twin import beside, half_step, set_parameter
+
+
+@jitable
+def step_beside(
+    V: Variations, scene: Scene, m: Method, t: float, h: float, k: int, e: float, side: int
+) -> int:
+    """Take the run's step from the point moved by e along derivative k; return a code."""
+    twin, workspace = view(V.words[TWIN], Scene), V.words[UP + side]
+    p, own = in_workspace(workspace)
+    set_parameter(V, twin, scene, k, e)
+    beside(V, m.y, k, e, own.y)
+    own.memory[SHOWN] = 0.0
+    code = call_int(p.rhs, (p.context, t, 0.0, own.y, own.k[0]))
+    if code == 0:
+        code = call_int(V.words[ATTEMPT], (workspace, t, h, own.y, own.trial))
+    if code != 0:
+        return code
+    if V.words[REMEMBERED] > 0:
+        for s in range(V.far.shape[1]):
+            for j in range(V.far.shape[2]):
+                V.far[side, s, j] = twin.work.memory[s, j] if twin.work.touching[s] == 1 else 0.0
+    if m.memory[SHOWN] == 1.0:
+        code = call_int(V.words[FIT_DENSE], (workspace, t, h, own.y, own.trial))
+    return code
+
+
+@jitable
+def explicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
+    """Fill derivative k at the end of the step that is taken; return a code."""
+    e = half_step(V, k, scene)
+    for side in range(2):
+        code = step_beside(V, scene, m, t, h, k, e if side == 0 else -e, side)
+        if code != 0:
+            return code
+    up, down = in_workspace(V.words[UP])[1], in_workspace(V.words[DOWN])[1]
+    part = 0.5 / e
+    for i in range(len(m.y)):
+        V.next[k, i] = part * (up.trial[i] - down.trial[i])
+    if m.memory[SHOWN] == 1.0:
+        for j in range(V.dense.shape[1]):
+            for i in range(len(m.y)):
+                V.dense[k, j, i] = part * (up.dense[j, i] - down.dense[j, i])
+    if V.words[REMEMBERED] > 0:
+        for s in range(V.far.shape[1]):
+            for j in range(V.far.shape[2]):
+                V.far[0, s, j] = part * (V.far[0, s, j] - V.far[1, s, j])
+    return 0

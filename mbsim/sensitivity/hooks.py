@@ -1,0 +1,133 @@
+"""The run's `commit` and `output`, which carry derivatives along.
+
+Both are hooks of the run's problem in the place of its own, which they pass on to: a run without
+sensitivities has nothing of this.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.hooks import Hook
+from mbsim.arrays.scene import Scene
+from mbsim.core.address import call_int, vector_at, view
+from mbsim.core.arrays import Pointer
+from mbsim.core.jitable import jitable
+from mbsim.core.problem import Problem
+from mbsim.integrators.scheme import LAST_STEP, LAST_TIME, SHOWN, TIME, Method, in_workspace
+from mbsim.sensitivity.arrays import (
+    ATTEMPT,
+    COMMIT,
+    FITTED,
+    LOST_FAILED,
+    METHOD,
+    OUTPUT,
+    REMEMBERED,
+    ROWS,
+    TWIN,
+    UP,
+    Variations,
+)
+from mbsim.sensitivity.explicit import explicit_step
+from mbsim.sensitivity.implicit import implicit_step
+from mbsim.sensitivity.twin import half_step, set_parameter
+
+#: Where the packed `Variations` stand: where those of MOREAU would, which takes no part in this.
+AT = Hook.STEPPING
+
+
+@jitable
+def lose(V: Variations, k: int, t: float, why: int) -> None:
+    """Know derivative k no more from time t on."""
+    if V.lost[k] == math.inf:
+        V.lost[k] = t
+        V.why[k] = why
+
+
+@jitable
+def take_step(V: Variations, scene: Scene, m: Method, t: float, h: float) -> None:
+    """Carry all derivatives over the step from t that is taken."""
+    twin = view(V.words[TWIN], Scene)
+    explicit = V.words[ATTEMPT] != 0
+    V.words[FITTED] = 1 if m.memory[SHOWN] == 1.0 or not explicit else 0
+    for k in range(len(V.size)):
+        if V.lost[k] < math.inf:
+            continue
+        if explicit:
+            code = explicit_step(V, scene, m, t, h, k)
+        else:
+            code = implicit_step(V, scene, m, t, h, k)
+        if code != 0:
+            lose(V, k, t, LOST_FAILED)
+        elif V.words[REMEMBERED] > 0:
+            for s in range(V.memory.shape[1]):
+                for j in range(V.memory.shape[2]):
+                    V.before[k, s, j] = V.memory[k, s, j]
+                    V.memory[k, s, j] = V.far[0, s, j]
+        set_parameter(V, twin, scene, k, 0.0)
+
+
+def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
+    """What follows from a step that is taken, and its derivatives."""
+    scene = view(context, Scene)
+    V = view(scene.world.hooks[AT], Variations)
+    m = in_workspace(V.words[METHOD])[1]
+    if h > 0.0:
+        take_step(V, scene, m, t - h, h)
+    word = call_int(V.words[COMMIT], (context, t, h, a, b))
+    for k in range(len(V.size)):
+        for i in range(len(m.y)):
+            V.d[k, i] = V.next[k, i]
+    return word
+
+
+@jitable
+def derivative_at(V: Variations, m: Method, k: int, t: float, i: int) -> float:
+    """Return derivative k of y[i] at a time within the last step, or at its end."""
+    h = m.memory[LAST_STEP]
+    if t >= m.memory[TIME] or h == 0.0 or V.words[FITTED] == 0:
+        return V.d[k, i]
+    s, d = min(1.0, (t - m.memory[LAST_TIME]) / h), V.dense[k]
+    r, last = 1.0 - s, len(d) - 1
+    value = d[last, i]
+    for j in range(last - 1, -1, -1):
+        value = d[j, i] + (s if j % 2 == 0 else r) * value
+    return value
+
+
+@jitable
+def write_beside(
+    V: Variations, scene: Scene, p: Problem, m: Method, t: float, h: float, k: int, y: Pointer
+) -> None:
+    """Write rows of results on either side for parameter k."""
+    twin, x, n = view(V.words[TWIN], Scene), V.row[1], len(m.y)
+    at = vector_at(y, n)
+    e = half_step(V, k, scene)
+    V.step[V.words[ROWS], k] = e
+    for side in range(2):
+        sign = 1.0 if side == 0 else -1.0
+        set_parameter(V, twin, scene, k, sign * e)
+        for i in range(n):
+            x[i] = at[i] + sign * e * derivative_at(V, m, k, t, i)
+        code = call_int(p.project, (p.context, t, 0.0, x, x))
+        answer = call_int(V.words[OUTPUT], (p.context, t, h, x, V.row[2]))
+        if code != 0 or answer < 0:
+            lose(V, k, t, LOST_FAILED)
+            # the row is there all the same, so that rows are told by their number
+            if answer < 0:
+                twin.rows.used[0] += 1
+    if V.lost[k] <= t:
+        V.step[V.words[ROWS], k] = math.nan
+    set_parameter(V, twin, scene, k, 0.0)
+
+
+def output_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
+    """A row of results, and those beside it."""
+    scene = view(context, Scene)
+    V = view(scene.world.hooks[AT], Variations)
+    m = in_workspace(V.words[METHOD])[1]
+    p = in_workspace(V.words[UP])[0]
+    for k in range(len(V.size)):
+        write_beside(V, scene, p, m, t, h, k, a)
+    V.words[ROWS] += 1
+    return call_int(V.words[OUTPUT], (context, t, h, a, b))
