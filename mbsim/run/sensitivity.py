@@ -102,7 +102,8 @@ def attach(runner: Runner, found: Sequence[Direction]) -> None:
             for _ in range(3):
                 hooks.ask_joints(Joints.PROJECT, start, y, y)
 
-    made = Sensitivities(runner.system, found, runner.method.y, assemble, runner.problem)
+    tol = runner.settings.stages[0].tol
+    made = Sensitivities(runner.system, found, runner.method.y, assemble, runner.problem, tol)
     runner.methods.follow(made)
     runner.sensitivities = made
     runner.problem = runner.methods.problem

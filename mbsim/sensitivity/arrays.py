@@ -10,15 +10,19 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from mbsim.core import tags
-from mbsim.core.arrays import F1, F2, F3, I1, I2
+from mbsim.core.arrays import F1, F2, F3, I1
 
-# numbers of `words`: the hooks of the run that are passed on to; tables of the run's method, of the
+# numbers of `words`: the hooks of the run, and of the twin, that are passed on to; tables of the run's method, of the
 # twin and of its two methods; addresses of an explicit method's functions, 0 for an implicit one;
 # coefficients of the dense output; numbers that a law remembers
 COMMIT, OUTPUT, METHOD, TWIN, UP, DOWN, ATTEMPT, FIT_DENSE, COEFFICIENTS, REMEMBERED = range(10)
-# whether the last step has a polynomial; rows of results so far; parameter that failed first, or -1
-FITTED, ROWS, JOINTS = range(10, 13)
-WORDS = 13
+# whether the last step has a polynomial; rows of results not taken yet; whether there are joints;
+# contacts that begin or end in the step; f of the twin; whether what changes is in order of time;
+# what touches on either side of a difference
+FITTED, ROWS, JOINTS, CHANGES, RHS, ORDERED, ALIKE = range(10, 17)
+WORDS = 18
+#: Contacts that may begin or end within one step.
+MOST_CHANGES = 16
 
 
 @tags.state
@@ -35,8 +39,15 @@ class Variations(NamedTuple):
     next: tags.Scratch[F2]  # (P, n) derivative at the end of the step that is taken
     far: tags.Scratch[F3]  # (2, ns, most) what laws make of their memory on either side
     stage: tags.Scratch[F2]  # (STAGES, n) of an implicit method
-    was: tags.Scratch[F2]  # (3, n) y before a commit, f behind it, a point
-    row: tags.Scratch[F2]  # (3, n) y of a row of results, one beside it, its f
+    path: tags.Scratch[F2]  # (coefficients, n) polynomial of the run's step
+    work: tags.Scratch[F2]  # (WORK, n) of `along`
+    error: tags.Scratch[F1]  # (P,) of the last step, over the derivative
+    enough: tags.Constant[F1]  # (1,) how large that may be
+    bends: tags.Scratch[I1]  # (P,) 1 where the last step was taken along the motion
+    seen: tags.Scratch[I1]  # (ns + 1,) in how many points of a step slots touched, of how many
+    kept: tags.Scratch[F2]  # (P, n) derivative at the begin of the last step
+    change: tags.Scratch[F2]  # (MOST_CHANGES, 2) slots that begin or end to touch, at which part
+    row: tags.Scratch[F2]  # (4, n) of a row of results: -, y beside it, its f, its derivative
     scale: tags.Constant[F1]  # (n,) usual size of a number of y
     size: tags.Constant[F1]  # (P,) of a parameter
     first: tags.Constant[I1]  # (P + 1,) first of the numbers that a parameter changes
@@ -44,7 +55,6 @@ class Variations(NamedTuple):
     base: tags.Constant[F1]  # what it is
     slope: tags.Constant[F1]  # its derivative
     step: tags.Scratch[F2]  # (rows, P) by how much a parameter is changed for a row of results
-    pair: tags.Scratch[I2]  # (0, 0)
 
 
 #: Why a derivative is not known from some time on.

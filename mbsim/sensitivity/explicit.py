@@ -36,35 +36,48 @@ def step_beside(
     code = call_int(p.rhs, (p.context, t, 0.0, own.y, own.k[0]))
     if code == 0:
         code = call_int(V.words[ATTEMPT], (workspace, t, h, own.y, own.trial))
-    if code != 0:
-        return code
-    if V.words[REMEMBERED] > 0:
+    if code == 0 and V.words[REMEMBERED] > 0:
         for s in range(V.far.shape[1]):
             for j in range(V.far.shape[2]):
                 V.far[side, s, j] = twin.work.memory[s, j] if twin.work.touching[s] == 1 else 0.0
-    if m.memory[SHOWN] == 1.0:
-        code = call_int(V.words[FIT_DENSE], (workspace, t, h, own.y, own.trial))
     return code
 
 
 @jitable
 def explicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
-    """Fill derivative k at the end of the step that is taken; return a code."""
+    """Fill derivative k at the end of the step that is taken, and its error; return a code."""
     e = half_step(V, k, scene)
     for side in range(2):
         code = step_beside(V, scene, m, t, h, k, e if side == 0 else -e, side)
         if code != 0:
             return code
     up, down = in_workspace(V.words[UP])[1], in_workspace(V.words[DOWN])[1]
-    part = 0.5 / e
+    part, error, whole = 0.5 / e, 0.0, 1.0 / V.size[k]
     for i in range(len(m.y)):
         V.next[k, i] = part * (up.trial[i] - down.trial[i])
-    if m.memory[SHOWN] == 1.0:
-        for j in range(V.dense.shape[1]):
-            for i in range(len(m.y)):
-                V.dense[k, j, i] = part * (up.dense[j, i] - down.dense[j, i])
+        error = max(error, part * abs(up.error[i] - down.error[i]) / V.scale[i])
+        whole = max(whole, abs(V.next[k, i]) / V.scale[i], abs(V.d[k, i]) / V.scale[i])
+    V.error[k] = error / whole
     if V.words[REMEMBERED] > 0:
         for s in range(V.far.shape[1]):
             for j in range(V.far.shape[2]):
                 V.far[0, s, j] = part * (V.far[0, s, j] - V.far[1, s, j])
+    return 0
+
+
+@jitable
+def fit_beside(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
+    """Fill the polynomials of the run's step, and of its derivative k; return a code."""
+    twin, e = view(V.words[TWIN], Scene), half_step(V, k, scene)
+    for side in range(2):
+        set_parameter(V, twin, scene, k, e if side == 0 else -e)
+        own = in_workspace(V.words[UP + side])[1]
+        code = call_int(V.words[FIT_DENSE], (V.words[UP + side], t, h, own.y, own.trial))
+        if code != 0:
+            return code
+    up, down = in_workspace(V.words[UP])[1], in_workspace(V.words[DOWN])[1]
+    for j in range(V.dense.shape[1]):
+        for i in range(len(m.y)):
+            V.dense[k, j, i] = 0.5 / e * (up.dense[j, i] - down.dense[j, i])
+            V.path[j, i] = 0.5 * (up.dense[j, i] + down.dense[j, i])
     return 0

@@ -8,27 +8,34 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.codes import NOW, WITHIN
 from mbsim.arrays.hooks import Hook
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, vector_at, view
-from mbsim.core.arrays import Pointer
+from mbsim.core.arrays import F1, Pointer
+from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import Problem
 from mbsim.integrators.scheme import LAST_STEP, LAST_TIME, SHOWN, TIME, Method, in_workspace
+from mbsim.sensitivity.along import is_bent, list_changes, order_changes, project_end, step_along
 from mbsim.sensitivity.arrays import (
     ATTEMPT,
+    CHANGES,
     COMMIT,
     FITTED,
+    JOINTS,
     LOST_FAILED,
     METHOD,
+    ORDERED,
     OUTPUT,
     REMEMBERED,
+    RHS,
     ROWS,
     TWIN,
     UP,
     Variations,
 )
-from mbsim.sensitivity.explicit import explicit_step
+from mbsim.sensitivity.explicit import explicit_step, fit_beside
 from mbsim.sensitivity.implicit import implicit_step
 from mbsim.sensitivity.twin import half_step, set_parameter
 
@@ -45,19 +52,45 @@ def lose(V: Variations, k: int, t: float, why: int) -> None:
 
 
 @jitable
+def carry(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
+    """Fill derivative k at the end of the step that is taken; return a code."""
+    if V.words[ATTEMPT] == 0:
+        return implicit_step(V, scene, m, t, h, k)
+    for s in range(len(V.seen)):
+        V.seen[s] = 0
+    code = explicit_step(V, scene, m, t, h, k)
+    if code != 0:
+        return code
+    bends = V.words[CHANGES] > 0 or is_bent(V, scene) or V.error[k] > V.enough[0]
+    V.bends[k] = 1 if bends else 0
+    if not bends and m.memory[SHOWN] == 0.0:
+        return 0
+    code = fit_beside(V, scene, m, t, h, k)
+    if code != 0 or not bends:
+        return code
+    if V.words[ORDERED] == 0:
+        V.words[ORDERED] = 1
+        if not order_changes(V, scene, t, h):
+            return Code.NOT_CONVERGED
+    for i in range(len(m.y)):
+        V.next[k, i] = V.d[k, i]
+    code = step_along(V, scene, m, t, h, k, 1.0)
+    if code == 0 and V.words[JOINTS] == 1:
+        code = project_end(V, scene, m, t + h, k, half_step(V, k, scene))
+    return code
+
+
+@jitable
 def take_step(V: Variations, scene: Scene, m: Method, t: float, h: float) -> None:
     """Carry all derivatives over the step from t that is taken."""
     twin = view(V.words[TWIN], Scene)
-    explicit = V.words[ATTEMPT] != 0
-    V.words[FITTED] = 1 if m.memory[SHOWN] == 1.0 or not explicit else 0
+    V.words[CHANGES] = V.words[ORDERED] = 0
+    listed = len(scene.contacts.id) == 0 or list_changes(V, scene, t, h)
+    V.words[FITTED] = 1 if m.memory[SHOWN] == 1.0 or V.words[ATTEMPT] == 0 else 0
     for k in range(len(V.size)):
         if V.lost[k] < math.inf:
             continue
-        if explicit:
-            code = explicit_step(V, scene, m, t, h, k)
-        else:
-            code = implicit_step(V, scene, m, t, h, k)
-        if code != 0:
+        if not listed or carry(V, scene, m, t, h, k) != 0:
             lose(V, k, t, LOST_FAILED)
         elif V.words[REMEMBERED] > 0:
             for s in range(V.memory.shape[1]):
@@ -65,6 +98,18 @@ def take_step(V: Variations, scene: Scene, m: Method, t: float, h: float) -> Non
                     V.before[k, s, j] = V.memory[k, s, j]
                     V.memory[k, s, j] = V.far[0, s, j]
         set_parameter(V, twin, scene, k, 0.0)
+
+
+def rhs_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
+    """f of the twin, and which slots touch there."""
+    twin = view(context, Scene)
+    V = view(twin.world.hooks[AT], Variations)
+    code = call_int(V.words[RHS], (context, t, h, a, b))
+    hit, last = twin.work.hit, len(twin.work.hit) - 1
+    for j in range(hit[last]):
+        V.seen[hit[j]] += 1
+    V.seen[last] += 1
+    return code
 
 
 def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
@@ -77,22 +122,38 @@ def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int
     word = call_int(V.words[COMMIT], (context, t, h, a, b))
     for k in range(len(V.size)):
         for i in range(len(m.y)):
+            V.kept[k, i] = V.d[k, i]
             V.d[k, i] = V.next[k, i]
     return word
 
 
 @jitable
-def derivative_at(V: Variations, m: Method, k: int, t: float, i: int) -> float:
-    """Return derivative k of y[i] at a time within the last step, or at its end."""
-    h = m.memory[LAST_STEP]
+def derivative_at(V: Variations, scene: Scene, m: Method, k: int, t: float, out: F1) -> int:
+    """Write derivative k at a time within the last step, or at its end; return a code."""
+    h, n = m.memory[LAST_STEP], len(out)
     if t >= m.memory[TIME] or h == 0.0 or V.words[FITTED] == 0:
-        return V.d[k, i]
-    s, d = min(1.0, (t - m.memory[LAST_TIME]) / h), V.dense[k]
-    r, last = 1.0 - s, len(d) - 1
-    value = d[last, i]
-    for j in range(last - 1, -1, -1):
-        value = d[j, i] + (s if j % 2 == 0 else r) * value
-    return value
+        for i in range(n):
+            out[i] = V.d[k, i]
+        return 0
+    s, code = min(1.0, (t - m.memory[LAST_TIME]) / h), 0
+    if V.bends[k] == 1:
+        twin = view(V.words[TWIN], Scene)
+        twin.world.past[0] = WITHIN
+        for i in range(n):
+            V.next[k, i] = V.kept[k, i]
+        code = step_along(V, scene, m, m.memory[LAST_TIME], h, k, s)
+        twin.world.past[0] = NOW
+        for i in range(n):
+            out[i] = V.next[k, i]
+        return code
+    d, r = V.dense[k], 1.0 - s
+    last = len(d) - 1
+    for i in range(n):
+        value = d[last, i]
+        for j in range(last - 1, -1, -1):
+            value = d[j, i] + (s if j % 2 == 0 else r) * value
+        out[i] = value
+    return code
 
 
 @jitable
@@ -104,11 +165,14 @@ def write_beside(
     at = vector_at(y, n)
     e = half_step(V, k, scene)
     V.step[V.words[ROWS], k] = e
+    w = V.row[3]
+    if derivative_at(V, scene, m, k, t, w) != 0:
+        lose(V, k, t, LOST_FAILED)
     for side in range(2):
         sign = 1.0 if side == 0 else -1.0
         set_parameter(V, twin, scene, k, sign * e)
         for i in range(n):
-            x[i] = at[i] + sign * e * derivative_at(V, m, k, t, i)
+            x[i] = at[i] + sign * e * w[i]
         code = call_int(p.project, (p.context, t, 0.0, x, x))
         answer = call_int(V.words[OUTPUT], (p.context, t, h, x, V.row[2]))
         if code != 0 or answer < 0:

@@ -24,9 +24,9 @@ from mbsim.sensitivity.arrays import JOINTS, REMEMBERED, TWIN, UP, Variations
 from mbsim.sensitivity.twin import half_step, set_parameter
 
 #: Rows of `Variations.stage`: stages less D, F, the right-hand sides and solutions of both systems,
-#: a point, f there and its counterpart.
-Z, F, REAL, REAL_D, PAIR, PAIR_D, POINT, SLOPE, OTHER = 0, 3, 6, 7, 8, 10, 12, 13, 14
-STAGES = 15
+#: a point and f there.
+Z, F, REAL, REAL_D, PAIR, PAIR_D, POINT, SLOPE = 0, 3, 6, 7, 8, 10, 12, 13
+STAGES = 14
 #: The iteration ends at a correction of this part of the derivative, or after so many, or where
 #: they get no smaller, which is rounding where they are below the third number.
 ENOUGH, MOST, ROUNDING = 1e-10, 12, 1e-5
@@ -113,22 +113,27 @@ def correct(
 
 
 @jitable
-def project_stages(V: Variations, m: Method, t: float, h: float, k: int, e: float) -> int:
+def project_stages(
+    V: Variations, scene: Scene, m: Method, t: float, h: float, k: int, e: float
+) -> int:
     """Put the derivatives of all stages along what holds; return a code."""
+    twin, n = view(V.words[TWIN], Scene), len(m.y)
     p = in_workspace(V.words[UP])[0]
-    part = 0.5 / e
-    x, other = V.stage[POINT], V.stage[OTHER]
-    for j in range(3):
-        for side in range(2):
-            point_beside(V, m, k, j, e if side == 0 else -e)
+    part, x = 0.5 / e, V.stage[POINT]
+    for side in range(2):
+        sign = 1.0 if side == 0 else -1.0
+        set_parameter(V, twin, scene, k, sign * e)
+        for j in range(3):
+            point_beside(V, m, k, j, sign * e)
             code = call_int(p.project, (p.context, t + C[j] * h, C[j] * h, x, x))
             if code != 0:
                 return code
-            if side == 0:
-                for i in range(len(m.y)):
-                    other[i] = x[i]
-        for i in range(len(m.y)):
-            V.stage[Z + j, i] = part * (other[i] - x[i]) - V.d[k, i]
+            moved = V.stage[F + j]
+            for i in range(n):
+                moved[i] = part * x[i] if side == 0 else moved[i] - part * x[i]
+    for j in range(3):
+        for i in range(n):
+            V.stage[Z + j, i] = V.stage[F + j, i] - V.d[k, i]
     return 0
 
 
@@ -145,8 +150,7 @@ def implicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k:
             return code
         code, size, whole = correct(V, own, m, t, h, k)
         if code == 0 and V.words[JOINTS] == 1:
-            # set to one side only, constraints that a parameter changes would count half
-            code = project_stages(V, m, t, h, k, e)
+            code = project_stages(V, scene, m, t, h, k, e)
         if code != 0:
             return code
         if not size < math.inf:

@@ -20,8 +20,10 @@ from mbsim.results.blocks import Block, Gathered
 from mbsim.results.signal_filter import SignalFilter
 from mbsim.results.signals import signals
 from mbsim.sensitivity import arrays as at
+from mbsim.sensitivity.along import WORK
 from mbsim.sensitivity.arrays import Variations
-from mbsim.sensitivity.hooks import AT, commit_hook, output_hook
+from mbsim.sensitivity.hooks import AT, commit_hook, output_hook, rhs_hook
+from mbsim.sensitivity.implicit import STAGES
 from mbsim.sensitivity.parameters import Direction, replaced, weighed
 
 if TYPE_CHECKING:
@@ -31,6 +33,8 @@ if TYPE_CHECKING:
 Array = np.ndarray[Any, Any]
 #: State that counts and judges: the twin's own, so that it leaves the run's alone.
 _OWN_STATE = ("log/", "audit/", "rows/", "state/memory", "state/before", "state/chattering")
+#: The error of a step of a derivative may be this part of it, or so many tol.
+ENOUGH, ENOUGH_TOL = 1e-8, 100.0
 #: What is no signal of the motion.
 _NO_SIGNALS = ("time", "state/", "contact_points/", "events")
 _WHY = {
@@ -69,6 +73,8 @@ class Sensitivities:
     directions : sequence of Direction
     assemble : callable
         Puts the bodies of a point of a system where constraints hold: the twin's, then the point.
+    tol : float
+        Of the run.
     """
 
     def __init__(
@@ -78,6 +84,7 @@ class Sensitivities:
         y: Array,
         assemble: Callable[[System, System, Any, Array], None],
         problem: Problem,
+        tol: float,
     ) -> None:
         self.system, self.directions = system, list(directions)
         self.twin = twin_of(system, directions)
@@ -86,7 +93,7 @@ class Sensitivities:
         self._steps: list[Array] = []
         own = problem._replace(context=int(self._table.ctypes.data))
         starts = [self._start(direction, assemble, own) for direction in self.directions]
-        self.arrays = self._arrays(y, np.array(starts))
+        self.arrays = self._arrays(y, np.array(starts), tol)
         self._pack()
         self._alive: Any = None
         self._mark: Any = None
@@ -110,7 +117,7 @@ class Sensitivities:
         tags.put_back(scene, tags.STATE, state)
         return weighed(found, direction.change)
 
-    def _arrays(self, y: Array, start: Array) -> Variations:
+    def _arrays(self, y: Array, start: Array, tol: float) -> Variations:
         """Return what is kept from step to step."""
         scene, n, count = self.system.scene, len(y), len(self.directions)
         shape = scene.state.memory.shape
@@ -132,12 +139,19 @@ class Sensitivities:
             before=np.zeros((count, *shape)),
             lost=np.full(count, math.inf),
             why=np.zeros(count, dtype=np.int64),
-            dense=np.zeros((count, 8, n)),
+            dense=np.zeros((count, 0, n)),
             next=np.zeros((count, n)),
             far=np.zeros((2, *shape)),
-            stage=np.zeros((15, n)),
-            was=np.zeros((3, n)),
-            row=np.zeros((3, n)),
+            stage=np.zeros((STAGES, n)),
+            path=np.zeros((0, n)),
+            work=np.zeros((WORK, n)),
+            error=np.zeros(count),
+            enough=np.full(1, max(ENOUGH, ENOUGH_TOL * tol)),
+            bends=np.zeros(count, dtype=np.int64),
+            seen=np.zeros(len(scene.state.touching) + 1, dtype=np.int64),
+            kept=np.zeros((count, n)),
+            change=np.zeros((at.MOST_CHANGES, 2)),
+            row=np.zeros((4, n)),
             scale=_scale(self.system, n),
             size=np.array([direction.size for direction in self.directions]),
             first=np.array(first, dtype=np.int64),
@@ -145,7 +159,6 @@ class Sensitivities:
             base=np.array(base),
             slope=np.array(slope),
             step=np.zeros((rows, count)),
-            pair=np.zeros((0, 0), dtype=np.int64),
         )
 
     def hooked(self, problem: Problem) -> Problem:
@@ -164,6 +177,9 @@ class Sensitivities:
             commit=int(words[at.COMMIT]),
             output=int(words[at.OUTPUT]),
         )
+        if len(self.system.contact_ids):
+            words[at.RHS] = problem.rhs
+            own = own._replace(rhs=jit.address(rhs_hook, HOOK))
         kept = []
         kinds = configuration.kinds(len(self.system.body_ids), n)
         for word in (at.UP, at.DOWN):
@@ -182,7 +198,8 @@ class Sensitivities:
         words[at.FITTED] = 0
         if self.arrays.dense.shape[1] != running.dense:
             self.arrays = self.arrays._replace(
-                dense=np.zeros((len(self.directions), running.dense, n))
+                dense=np.zeros((len(self.directions), running.dense, n)),
+                path=np.zeros((running.dense, n)),
             )
             self._pack()
         self._alive = kept
@@ -206,7 +223,9 @@ class Sensitivities:
     def go_back(self) -> None:
         """Go back to what was marked."""
         kept, rows, self._steps = self._mark
-        self.arrays = self.arrays._replace(dense=kept["dense"])
+        dense = kept["dense"]
+        path = np.zeros(dense.shape[1:])
+        self.arrays = self.arrays._replace(dense=dense, path=path)
         tags.put_back(self.arrays, tags.STATE, kept)
         self.gathered.restore(rows)
         self._pack()
