@@ -330,7 +330,7 @@ def step_along(
     V: Variations, scene: Scene, m: Method, t: float, h: float, k: int, until: float
 ) -> int:
     """Carry the derivative in `next` over a part of the step, contact by contact; return a code."""
-    e = half_step(V, k, scene)
+    e = half_step(V, k)
     begin = 0.0
     for j in range(V.words[CHANGES]):
         end = V.change[j, 1]

@@ -20,7 +20,9 @@ COMMIT, OUTPUT, METHOD, TWIN, UP, DOWN, ATTEMPT, FIT_DENSE, COEFFICIENTS, REMEMB
 # contacts that begin or end in the step; f of the twin; whether what changes is in order of time;
 # what touches on either side of a difference
 FITTED, ROWS, JOINTS, CHANGES, RHS, ORDERED, ALIKE = range(10, 17)
-WORDS = 18
+# evaluations beside the run; derivatives of steps that were taken along the motion
+ASKED, BENT = 18, 19
+WORDS = 20
 #: Contacts that may begin or end within one step.
 MOST_CHANGES = 16
 
@@ -49,6 +51,8 @@ class Variations(NamedTuple):
     change: tags.Scratch[F2]  # (MOST_CHANGES, 2) slots that begin or end to touch, at which part
     row: tags.Scratch[F2]  # (4, n) of a row of results: -, y beside it, its f, its derivative
     scale: tags.Constant[F1]  # (n,) usual size of a number of y
+    room: tags.Constant[F1]  # (n,) by how much it may be changed for a difference
+    weights: tags.Constant[F1]  # of an explicit method's stages; none where joints hold bodies
     size: tags.Constant[F1]  # (P,) of a parameter
     first: tags.Constant[I1]  # (P + 1,) first of the numbers that a parameter changes
     place: tags.Constant[I1]  # where each of these is

@@ -46,7 +46,7 @@ def step_beside(
 @jitable
 def explicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
     """Fill derivative k at the end of the step that is taken, and its error; return a code."""
-    e = half_step(V, k, scene)
+    e = half_step(V, k)
     for side in range(2):
         code = step_beside(V, scene, m, t, h, k, e if side == 0 else -e, side)
         if code != 0:
@@ -54,7 +54,14 @@ def explicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k:
     up, down = in_workspace(V.words[UP])[1], in_workspace(V.words[DOWN])[1]
     part, error, whole = 0.5 / e, 0.0, 1.0 / V.size[k]
     for i in range(len(m.y)):
-        V.next[k, i] = part * (up.trial[i] - down.trial[i])
+        if len(V.weights) > 0:
+            # what is rounded is the change alone
+            rise = 0.0
+            for j in range(len(V.weights)):
+                rise += V.weights[j] * (up.k[j, i] - down.k[j, i])
+            V.next[k, i] = V.d[k, i] + h * part * rise
+        else:
+            V.next[k, i] = part * (up.trial[i] - down.trial[i])
         error = max(error, part * abs(up.error[i] - down.error[i]) / V.scale[i])
         whole = max(whole, abs(V.next[k, i]) / V.scale[i], abs(V.d[k, i]) / V.scale[i])
     V.error[k] = error / whole
@@ -68,7 +75,7 @@ def explicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k:
 @jitable
 def fit_beside(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
     """Fill the polynomials of the run's step, and of its derivative k; return a code."""
-    twin, e = view(V.words[TWIN], Scene), half_step(V, k, scene)
+    twin, e = view(V.words[TWIN], Scene), half_step(V, k)
     for side in range(2):
         set_parameter(V, twin, scene, k, e if side == 0 else -e)
         own = in_workspace(V.words[UP + side])[1]

@@ -19,7 +19,9 @@ from mbsim.core.problem import Problem
 from mbsim.integrators.scheme import LAST_STEP, LAST_TIME, SHOWN, TIME, Method, in_workspace
 from mbsim.sensitivity.along import is_bent, list_changes, order_changes, project_end, step_along
 from mbsim.sensitivity.arrays import (
+    ASKED,
     ATTEMPT,
+    BENT,
     CHANGES,
     COMMIT,
     FITTED,
@@ -63,6 +65,7 @@ def carry(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) ->
         return code
     bends = V.words[CHANGES] > 0 or is_bent(V, scene) or V.error[k] > V.enough[0]
     V.bends[k] = 1 if bends else 0
+    V.words[BENT] += V.bends[k]
     if not bends and m.memory[SHOWN] == 0.0:
         return 0
     code = fit_beside(V, scene, m, t, h, k)
@@ -76,7 +79,7 @@ def carry(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) ->
         V.next[k, i] = V.d[k, i]
     code = step_along(V, scene, m, t, h, k, 1.0)
     if code == 0 and V.words[JOINTS] == 1:
-        code = project_end(V, scene, m, t + h, k, half_step(V, k, scene))
+        code = project_end(V, scene, m, t + h, k, half_step(V, k))
     return code
 
 
@@ -105,6 +108,7 @@ def rhs_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     twin = view(context, Scene)
     V = view(twin.world.hooks[AT], Variations)
     code = call_int(V.words[RHS], (context, t, h, a, b))
+    V.words[ASKED] += 1
     hit, last = twin.work.hit, len(twin.work.hit) - 1
     for j in range(hit[last]):
         V.seen[hit[j]] += 1
@@ -163,7 +167,7 @@ def write_beside(
     """Write rows of results on either side for parameter k."""
     twin, x, n = view(V.words[TWIN], Scene), V.row[1], len(m.y)
     at = vector_at(y, n)
-    e = half_step(V, k, scene)
+    e = half_step(V, k)
     V.step[V.words[ROWS], k] = e
     w = V.row[3]
     if derivative_at(V, scene, m, k, t, w) != 0:

@@ -141,7 +141,7 @@ def project_stages(
 def implicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
     """Fill derivative k at the end of the step that is taken; return a code."""
     own = in_workspace(V.words[UP])[0]
-    e = half_step(V, k, scene)
+    e = half_step(V, k)
     extrapolate(V, m, h, k)
     before = math.inf
     for iteration in range(MOST):

@@ -13,7 +13,7 @@ from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.hooks import Hook
 from mbsim.core import jit, tags
 from mbsim.core.address import pack
-from mbsim.core.problem import HOOK
+from mbsim.core.problem import HOOK, VELOCITY
 from mbsim.dynamics.bodies import configuration
 from mbsim.integrators import scheme
 from mbsim.results.blocks import Block, Gathered
@@ -25,6 +25,7 @@ from mbsim.sensitivity.arrays import Variations
 from mbsim.sensitivity.hooks import AT, commit_hook, output_hook, rhs_hook
 from mbsim.sensitivity.implicit import STAGES
 from mbsim.sensitivity.parameters import Direction, replaced, weighed
+from mbsim.sensitivity.twin import STEP, STEP_OF_CONTACTS
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
@@ -34,7 +35,7 @@ Array = np.ndarray[Any, Any]
 #: State that counts and judges: the twin's own, so that it leaves the run's alone.
 _OWN_STATE = ("log/", "audit/", "rows/", "state/memory", "state/before", "state/chattering")
 #: The error of a step of a derivative may be this part of it, or so many tol.
-ENOUGH, ENOUGH_TOL = 1e-8, 100.0
+ENOUGH, ENOUGH_TOL = 1e-9, 10.0
 #: What is no signal of the motion.
 _NO_SIGNALS = ("time", "state/", "contact_points/", "events")
 _WHY = {
@@ -153,6 +154,8 @@ class Sensitivities:
             change=np.zeros((at.MOST_CHANGES, 2)),
             row=np.zeros((4, n)),
             scale=_scale(self.system, n),
+            room=_scale(self.system, n) * _steps(self.system, n),
+            weights=np.zeros(0),
             size=np.array([direction.size for direction in self.directions]),
             first=np.array(first, dtype=np.int64),
             place=np.array(place, dtype=np.int64),
@@ -177,9 +180,8 @@ class Sensitivities:
             commit=int(words[at.COMMIT]),
             output=int(words[at.OUTPUT]),
         )
-        if len(self.system.contact_ids):
-            words[at.RHS] = problem.rhs
-            own = own._replace(rhs=jit.address(rhs_hook, HOOK))
+        words[at.RHS] = problem.rhs
+        own = own._replace(rhs=jit.address(rhs_hook, HOOK))
         kept = []
         kinds = configuration.kinds(len(self.system.body_ids), n)
         for word in (at.UP, at.DOWN):
@@ -196,12 +198,16 @@ class Sensitivities:
         words[at.REMEMBERED] = self.system.scene.state.memory.shape[1]
         words[at.JOINTS] = int(self.system.scene.world.hooks[Hook.JOINTS] != 0)
         words[at.FITTED] = 0
+        joints = words[at.JOINTS] == 1
+        self.arrays = self.arrays._replace(
+            weights=np.zeros(0) if joints or running.implicit else _weights(running)
+        )
         if self.arrays.dense.shape[1] != running.dense:
             self.arrays = self.arrays._replace(
                 dense=np.zeros((len(self.directions), running.dense, n)),
                 path=np.zeros((running.dense, n)),
             )
-            self._pack()
+        self._pack()
         self._alive = kept
 
     def take(self) -> None:
@@ -259,6 +265,8 @@ class Sensitivities:
                 found[f"sensitivity/{direction.name}/{name}"] = (up - sides[1][name]) / (2.0 * wide)
             about[f"sensitivity/{direction.name}"] = {
                 "value": direction.value,
+                "steps_along": int(self.arrays.words[at.BENT]),
+                "evaluations": int(self.arrays.words[at.ASKED]),
                 "known_until": float(self.arrays.lost[k]),
                 "why": _WHY.get(int(self.arrays.why[k]), ""),
             }
@@ -287,6 +295,24 @@ def _part(block: Block, rows: slice) -> Block:
 def _by_path(scene: Any) -> list[tuple[str, Array]]:
     """Return all arrays of a scene by path."""
     return [pair for tag in tags.Tag for pair in tags.arrays(scene, tag)]
+
+
+def _steps(system: System, n: int) -> Array:
+    """Return half of the step of a difference in usual sizes of every number of y."""
+    found = np.full(n, STEP)
+    if system.contact_ids:
+        kinds = np.array(configuration.kinds(len(system.body_ids), n))
+        found[kinds != VELOCITY] = STEP_OF_CONTACTS
+    return found
+
+
+def _weights(running: scheme.Scheme) -> Array:
+    """Return by what weights an explicit method adds up its stages."""
+    from mbsim.integrators import dop853, dopri5
+
+    if running is dop853.SCHEME:
+        return np.array(dop853.A[12][:12])
+    return np.array((dopri5.B1, 0.0, dopri5.B3, dopri5.B4, dopri5.B5, dopri5.B6))
 
 
 def _scale(system: System, n: int) -> Array:

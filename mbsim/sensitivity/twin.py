@@ -12,20 +12,19 @@ from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
 from mbsim.sensitivity.arrays import REMEMBERED, Variations
 
-#: Half of the step of differences, in usual sizes of y and of the parameter.
+#: Half of the step of differences, in usual sizes of the parameter and of y.
 STEP = 1e-6
-#: The same where there are contacts: depths are far smaller than the model.
-STEP_OF_CONTACTS = 3e-8
+#: The same of places where there are contacts: depths are far smaller than the model.
+STEP_OF_CONTACTS = 1e-9
 
 
 @jitable
-def half_step(V: Variations, k: int, scene: Scene) -> float:
+def half_step(V: Variations, k: int) -> float:
     """Return by how much parameter k is changed to either side."""
-    largest = 1.0 / V.size[k]
-    for i in range(len(V.scale)):
-        largest = max(largest, abs(V.d[k, i]) / V.scale[i])
-    part = STEP_OF_CONTACTS if len(scene.contacts.id) > 0 else STEP
-    return part / largest
+    largest = 1.0 / (STEP * V.size[k])
+    for i in range(len(V.room)):
+        largest = max(largest, abs(V.d[k, i]) / V.room[i])
+    return 1.0 / largest
 
 
 @jitable
