@@ -19,19 +19,30 @@ from mbsim.core.address import call_int, view
 from mbsim.core.arrays import F1, F2
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
+from mbsim.core.problem import ASK
 from mbsim.integrators.dopri5 import (
     A21, A31, A32, A41, A42, A43, A51, A52, A53, A54, A61, A62, A63, A64, A65,
     B1, B3, B4, B5, B6, C2, C3, C4, C5, E1, E3, E4, E5, E6, E7,
 )  # fmt: skip
 from mbsim.integrators.scheme import Method, in_workspace
-from mbsim.sensitivity.arrays import ALIKE, CHANGES, MOST_CHANGES, TWIN, UP, Variations
+from mbsim.sensitivity.arrays import (
+    ALIKE,
+    BEFORE,
+    CHANGES,
+    F_BEFORE,
+    MOST_CHANGES,
+    STRAIGHT,
+    TWIN,
+    UP,
+    Variations,
+)
 from mbsim.sensitivity.twin import half_step, set_parameter
 
 #: Rows of `Variations.work`: a point, f on either side, D at a stage, its slopes.
 POINT, UPPER, LOWER, STAGE, FIRST = range(5)
 SECOND, THIRD, WORK = FIRST + 1, FIRST + 2, FIRST + 7
-#: Tries within a step at most, and its shortest part.
-MOST_PARTS, SHORTEST = 2000, 1e-9
+#: After so many tries less is asked for; the shortest part of a step.
+MANY_PARTS, SHORTEST = 60, 1e-9
 C = np.array((0.0, C2, C3, C4, C5, 1.0, 1.0))
 A = np.array(
     (
@@ -49,14 +60,20 @@ E = np.array((E1, 0.0, E3, E4, E5, E6, E7))
 NEAREST, FARTHER = 1e-12, 4.0
 #: A difference is no smaller than this part of the usual one.
 LEAST = 1e-4
+#: A change is looked for within so many lengths of a step of where the run has it.
+FARTHEST = 100.0
 #: A jump of f counts if what it does to y over the step is more than this part of the usual size.
 JUMPS = 1e-13
 
 
 @jitable
 def point_at(V: Variations, s: float, out: F1) -> None:
-    """Write the state at the part s of the step."""
+    """Write the state at the part s of the step, or of a straight line to its end."""
     path, r = V.path, 1.0 - s
+    if V.words[STRAIGHT] == 1:
+        for i in range(len(out)):
+            out[i] = V.jump[BEFORE, i] + (s - 1.0) * V.line[0] * V.jump[F_BEFORE, i]
+        return
     last = len(path) - 1
     for i in range(len(out)):
         value = path[last, i]
@@ -162,8 +179,9 @@ def integrate(
     tries = 0
     while s < end:
         tries += 1
-        if tries > MOST_PARTS:
-            return Code.NOT_CONVERGED
+        if tries % MANY_PARTS == 0:
+            # what is left is rounding of forces
+            most *= 10.0
         last = s + 1.0001 * part >= end
         part = end - s if last else part
         code, error = try_part(V, scene, t, h, k, (begin, end, part, part * h), s, e)
@@ -182,13 +200,20 @@ def integrate(
 def touches(
     V: Variations, scene: Scene, t: float, h: float, k: int, s: float, e: float, slot: int
 ) -> int:
-    """Return 1 if a slot touches at the part s of the step, moved by e; 0 if not, less a code."""
+    """Return 1 if a slot touches at the part s of the step, moved by e; 0 if not, less a code.
+
+    With a slot below 0: if a force is on another branch.
+    """
     twin, w = view(V.words[TWIN], Scene), V.work
     p = in_workspace(V.words[UP])[0]
     point_at(V, s, w[POINT])
     if e != 0.0:
         for i in range(V.next.shape[1]):
             w[POINT, i] += e * V.next[k, i]
+    if slot < 0:
+        # asked of all branches at once
+        answer = call_int(p.switching, (p.context, t + s * h, ASK, w[POINT], w[UPPER]))
+        return min(answer, 1)
     code = call_int(p.rhs, (p.context, t + s * h, s * h, w[POINT], w[UPPER]))
     return -code if code != 0 else twin.work.touching[slot]
 
@@ -202,18 +227,18 @@ def crossing(
     Looked for in all of it, or no farther than `around` from where it does with e = 0.
     """
     set_parameter(V, view(V.words[TWIN], Scene), scene, k, e)
-    before = 1 - scene.work.touching[slot]
+    before = 1 - scene.work.touching[slot] if slot >= 0 else 0
     low, high = 0.0, 1.0
     if around > 0.0:
         low, high = around, around
         reach = 1e-9
-        while reach < 1.0:
+        while reach < FARTHEST:
             low, high = around - reach, around + reach
             if touches(V, scene, t, h, k, low, e, slot) == before:
                 if touches(V, scene, t, h, k, high, e, slot) == 1 - before:
                     break
             reach *= 8.0
-        if reach >= 1.0:
+        if reach >= FARTHEST:
             return math.nan
     while True:
         middle = 0.5 * (low + high)

@@ -22,7 +22,11 @@ COMMIT, OUTPUT, METHOD, TWIN, UP, DOWN, ATTEMPT, FIT_DENSE, COEFFICIENTS, REMEMB
 FITTED, ROWS, JOINTS, CHANGES, RHS, ORDERED, ALIKE = range(10, 17)
 # evaluations beside the run; derivatives of steps that were taken along the motion
 ASKED, BENT = 18, 19
-WORDS = 20
+# whether points are on a straight line instead of on the step's polynomial
+STRAIGHT = 20
+WORDS = 21
+#: Rows of `Variations.jump`: y before the commit, f before and behind it.
+BEFORE, F_BEFORE, F_BEHIND = range(3)
 #: Contacts that may begin or end within one step.
 MOST_CHANGES = 16
 
@@ -46,6 +50,10 @@ class Variations(NamedTuple):
     error: tags.Scratch[F1]  # (P,) of the last step, over the derivative
     enough: tags.Constant[F1]  # (1,) how large that may be
     bends: tags.Scratch[I1]  # (P,) 1 where the last step was taken along the motion
+    jump: tags.Scratch[F2]  # (3, n) see BEFORE
+    line: tags.Scratch[F1]  # (1,) length of the straight line [T]
+    shift: tags.Scratch[F1]  # (P,) by how much the end of the step is later, by the parameter
+    reason: tags.Scratch[F1]  # (P,) why a derivative is lost at the end of the step, or 0
     seen: tags.Scratch[I1]  # (ns + 1,) in how many points of a step slots touched, of how many
     kept: tags.Scratch[F2]  # (P, n) derivative at the begin of the last step
     change: tags.Scratch[F2]  # (MOST_CHANGES, 2) slots that begin or end to touch, at which part

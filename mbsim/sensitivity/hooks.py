@@ -15,15 +15,26 @@ from mbsim.core.address import call_int, vector_at, view
 from mbsim.core.arrays import F1, Pointer
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import Problem
-from mbsim.integrators.scheme import LAST_STEP, LAST_TIME, SHOWN, TIME, Method, in_workspace
+from mbsim.core.problem import Problem, Taken
+from mbsim.integrators.scheme import (
+    LAST_STEP,
+    LAST_TIME,
+    OWN_TIME,
+    SHOWN,
+    SWITCHED,
+    TIME,
+    Method,
+    in_workspace,
+)
 from mbsim.sensitivity.along import is_bent, list_changes, order_changes, project_end, step_along
 from mbsim.sensitivity.arrays import (
     ASKED,
     ATTEMPT,
+    BEFORE,
     BENT,
     CHANGES,
     COMMIT,
+    F_BEFORE,
     FITTED,
     JOINTS,
     LOST_FAILED,
@@ -33,10 +44,12 @@ from mbsim.sensitivity.arrays import (
     REMEMBERED,
     RHS,
     ROWS,
+    STRAIGHT,
     TWIN,
     UP,
     Variations,
 )
+from mbsim.sensitivity.events import SPAN, cross, note_memory, note_shift
 from mbsim.sensitivity.explicit import explicit_step, fit_beside
 from mbsim.sensitivity.implicit import implicit_step
 from mbsim.sensitivity.twin import half_step, set_parameter
@@ -120,15 +133,44 @@ def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int
     """What follows from a step that is taken, and its derivatives."""
     scene = view(context, Scene)
     V = view(scene.world.hooks[AT], Variations)
-    m = in_workspace(V.words[METHOD])[1]
-    if h > 0.0:
-        take_step(V, scene, m, t - h, h)
+    p, m = in_workspace(V.words[METHOD])
+    if h == 0.0:
+        return call_int(V.words[COMMIT], (context, t, h, a, b))
+    n = len(m.y)
+    y, f = vector_at(a, n), vector_at(b, n)
+    take_step(V, scene, m, t - h, h)
+    switched = p.switching != 0 and m.memory[SWITCHED] > 0.0
+    for i in range(n):
+        V.jump[BEFORE, i], V.jump[F_BEFORE, i] = y[i], f[i]
+    if switched:
+        note_changes(V, scene, m, t)
     word = call_int(V.words[COMMIT], (context, t, h, a, b))
+    if word >= 0 and (switched or word & (Taken.Y_CHANGED + Taken.BEGIN_ANEW)):
+        for k in range(len(V.size)):
+            V.reason[k] = 0.0
+        cross(V, scene, t, y, switched, V.reason)
+        for k in range(len(V.size)):
+            if V.reason[k] != 0.0:
+                lose(V, k, t, int(V.reason[k]))
     for k in range(len(V.size)):
-        for i in range(len(m.y)):
+        for i in range(n):
             V.kept[k, i] = V.d[k, i]
             V.d[k, i] = V.next[k, i]
     return word
+
+
+@jitable
+def note_changes(V: Variations, scene: Scene, m: Method, t: float) -> None:
+    """Find how the end of a step at which a branch changes moves with every parameter."""
+    # of a very short step, as many end at a branch, the polynomial is all rounding
+    H = V.line[0] = SPAN * m.memory[OWN_TIME]
+    V.words[STRAIGHT] = 1
+    for k in range(len(V.size)):
+        if V.lost[k] == math.inf:
+            note_shift(V, scene, t, H, k)
+            if V.words[REMEMBERED] > 0 and abs(V.shift[k]) < math.inf:
+                note_memory(V, scene, t, H, k)
+    V.words[STRAIGHT] = 0
 
 
 @jitable

@@ -1,0 +1,152 @@
+"""Derivatives across the end of a step at which friction or a force goes to another branch.
+
+With y+ = R(t, y-) at the time t* of the change, and f- and f+ on its sides,
+
+    D+ = R_y D- + R_p + (dR/dt - f+) dt*/dp,
+
+R being y itself but for what friction carries, which begins as another number (transfer condition;
+V. Saltykov, and W. F. Feehery, J. E. Tolsma, P. I. Barton, Appl. Numer. Math. 25 (1997) 41). dt*/dp
+is found as the time was: where both sides of the difference, carried on by the step's polynomial,
+ask for the other branch.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.scene import Scene
+from mbsim.core.address import call_int, view
+from mbsim.core.arrays import F1
+from mbsim.core.jitable import jitable
+from mbsim.integrators.scheme import in_workspace
+from mbsim.sensitivity.along import crossing, point_at
+from mbsim.sensitivity.arrays import (
+    BEFORE,
+    F_BEFORE,
+    F_BEHIND,
+    LOST_GRAZING,
+    LOST_JUMP,
+    REMEMBERED,
+    TWIN,
+    UP,
+    Variations,
+)
+from mbsim.sensitivity.twin import half_step, set_parameter
+
+#: Stands for a change of branch where `crossing` takes a slot.
+BRANCH = -1
+#: Times of changes are looked for along a straight line as long as this part of the problem's own
+#: time; how far behind them what friction keeps is asked for, over that.
+SPAN, BEHIND = 1e-4, 1e-5
+#: So often a shorter difference is tried for the time of a change.
+TRIES = 4
+#: A jump of f below this part of its size is none.
+NONE = 1e-9
+
+
+@jitable
+def note_shift(V: Variations, scene: Scene, t: float, H: float, k: int) -> None:
+    """Find how fast the time t, at which a branch changes, moves with parameter k."""
+    twin, e = view(V.words[TWIN], Scene), half_step(V, k)
+    for j in range(len(twin.state.chattering)):
+        twin.state.chattering[j] = scene.state.chattering[j]
+    V.shift[k] = math.nan
+    for _ in range(TRIES):
+        up = crossing(V, scene, t - H, H, k, e, BRANCH, 1.0)
+        down = crossing(V, scene, t - H, H, k, -e, BRANCH, 1.0)
+        if abs(up - down) < math.inf:
+            V.shift[k] = 0.5 / e * (up - down) * H
+            return
+        e *= 0.1
+
+
+@jitable
+def note_memory(V: Variations, scene: Scene, t: float, H: float, k: int) -> None:
+    """Find what friction keeps of a change of branch, each side at its own time of that.
+
+    A little behind it, so that both ask for the branch that the run asks for.
+    """
+    twin, w, e = view(V.words[TWIN], Scene), V.work[0], half_step(V, k)
+    p = in_workspace(V.words[UP])[0]
+    for side in range(2):
+        x = e if side == 0 else -e
+        set_parameter(V, twin, scene, k, x)
+        late = BEHIND * H + x * V.shift[k]
+        for i in range(len(w)):
+            w[i] = V.jump[BEFORE, i] + x * V.next[k, i] + late * V.jump[F_BEFORE, i]
+        if call_int(p.rhs, (p.context, t + late, 0.0, w, V.work[1])) != 0:
+            V.shift[k] = math.nan
+        for s in range(V.far.shape[1]):
+            for j in range(V.far.shape[2]):
+                V.far[side, s, j] = twin.work.memory[s, j] if twin.work.touching[s] == 1 else 0.0
+    for s in range(V.far.shape[1]):
+        for j in range(V.far.shape[2]):
+            V.memory[k, s, j] = 0.5 / e * (V.far[0, s, j] - V.far[1, s, j])
+
+
+@jitable
+def note_rates(V: Variations, twin: Scene, t: float, H: float, y: F1) -> None:
+    """Find how fast what friction keeps changes behind time t, where y' is known."""
+    p = in_workspace(V.words[UP])[0]
+    w = V.work[0]
+    for side in range(2):
+        late = BEHIND * H * (2.0 - side)
+        for i in range(len(w)):
+            w[i] = y[i] + late * V.jump[F_BEHIND, i]
+        if call_int(p.rhs, (p.context, t + late, 0.0, w, V.work[1])) != 0:
+            return
+        for s in range(V.far.shape[1]):
+            for j in range(V.far.shape[2]):
+                V.far[side, s, j] = twin.work.memory[s, j] if twin.work.touching[s] == 1 else 0.0
+    for s in range(V.far.shape[1]):
+        for j in range(V.far.shape[2]):
+            V.far[0, s, j] = (V.far[0, s, j] - V.far[1, s, j]) / (BEHIND * H)
+
+
+@jitable
+def carried_memory(V: Variations, scene: Scene, k: int, i: int) -> float:
+    """Return the derivative of what y[i], which friction carries, begins as."""
+    for s in range(len(scene.slots.z)):
+        z = scene.slots.z[s]
+        c = scene.kinds.contact[scene.pairs.kind[scene.slots.pair[s]]]
+        if z >= 0 and z <= i < z + scene.contacts.carried[c]:
+            return V.memory[k, s, i - z]
+    return 0.0
+
+
+@jitable
+def cross(V: Variations, scene: Scene, t: float, y: F1, switched: bool, lost: F1) -> None:
+    """Let all derivatives in `next` jump with what a commit has changed; y is behind it.
+
+    `lost` gets the reason why a derivative is not known from here on, 0 where it is.
+    """
+    twin, n = view(V.words[TWIN], Scene), len(y)
+    p = in_workspace(V.words[UP])[0]
+    set_parameter(V, twin, scene, 0, 0.0)
+    code = call_int(p.rhs, (p.context, t, 0.0, y, V.jump[F_BEHIND]))
+    if switched and V.words[REMEMBERED] > 0 and code == 0:
+        note_rates(V, twin, t, V.line[0], y)
+    largest, usual = 0.0, 0.0
+    for i in range(n):
+        usual = max(usual, abs(V.jump[F_BEFORE, i]) / V.scale[i])
+        largest = max(largest, abs(V.jump[F_BEFORE, i] - V.jump[F_BEHIND, i]) / V.scale[i])
+    jumps = code != 0 or not largest <= NONE * usual
+    for k in range(len(V.size)):
+        shift = V.shift[k] if switched else 0.0
+        if jumps and not switched:
+            lost[k] = LOST_JUMP
+        elif jumps and not abs(shift) < math.inf:
+            lost[k] = LOST_GRAZING
+        for i in range(n):
+            if y[i] != V.jump[BEFORE, i] and y[i] == 0.0:
+                V.next[k, i] = 0.0
+            elif y[i] != V.jump[BEFORE, i] and V.words[REMEMBERED] > 0:
+                begins = carried_memory(V, scene, k, i)
+                V.next[k, i] = begins - (V.jump[F_BEHIND, i] * shift if jumps else 0.0)
+            elif jumps:
+                V.next[k, i] += (V.jump[F_BEFORE, i] - V.jump[F_BEHIND, i]) * shift
+        if switched and jumps:
+            # what is kept is that of the time of the change; the run has it of its own
+            for s in range(V.memory.shape[1]):
+                for j in range(V.memory.shape[2]):
+                    V.memory[k, s, j] -= V.far[0, s, j] * shift
