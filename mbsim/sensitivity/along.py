@@ -43,6 +43,8 @@ POINT, UPPER, LOWER, STAGE, FIRST = range(5)
 SECOND, THIRD, WORK = FIRST + 1, FIRST + 2, FIRST + 7
 #: After so many tries less is asked for; the shortest part of a step.
 MANY_PARTS, SHORTEST = 60, 1e-9
+#: What is no longer taken for rounding.
+ROUGHEST = 1e-5
 C = np.array((0.0, C2, C3, C4, C5, 1.0, 1.0))
 A = np.array(
     (
@@ -182,6 +184,8 @@ def integrate(
         if tries % MANY_PARTS == 0:
             # what is left is rounding of forces
             most *= 10.0
+            if most > ROUGHEST:
+                return Code.NOT_CONVERGED
         last = s + 1.0001 * part >= end
         part = end - s if last else part
         code, error = try_part(V, scene, t, h, k, (begin, end, part, part * h), s, e)

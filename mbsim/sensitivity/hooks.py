@@ -67,21 +67,33 @@ def lose(V: Variations, k: int, t: float, why: int) -> None:
 
 
 @jitable
+def fit(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
+    """Fill the polynomials of the run's step, and of derivative k of an explicit one."""
+    if V.words[ATTEMPT] != 0:
+        return fit_beside(V, scene, m, t, h, k)
+    for i in range(len(m.y)):
+        V.path[0, i] = m.y[i]
+        for j in range(3):
+            V.path[1 + j, i] = m.ahead[j, i]
+    return 0
+
+
+@jitable
 def carry(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
     """Fill derivative k at the end of the step that is taken; return a code."""
-    if V.words[ATTEMPT] == 0:
-        return implicit_step(V, scene, m, t, h, k)
     for s in range(len(V.seen)):
         V.seen[s] = 0
-    code = explicit_step(V, scene, m, t, h, k)
+    if V.words[ATTEMPT] == 0:
+        code = implicit_step(V, scene, m, t, h, k)
+    else:
+        code = explicit_step(V, scene, m, t, h, k)
     if code != 0:
         return code
     bends = V.words[CHANGES] > 0 or is_bent(V, scene) or V.error[k] > V.enough[0]
     V.bends[k] = 1 if bends else 0
     V.words[BENT] += V.bends[k]
-    if not bends and m.memory[SHOWN] == 0.0:
-        return 0
-    code = fit_beside(V, scene, m, t, h, k)
+    if bends or (m.memory[SHOWN] == 1.0 and V.words[ATTEMPT] != 0):
+        code = fit(V, scene, m, t, h, k)
     if code != 0 or not bends:
         return code
     if V.words[ORDERED] == 0:

@@ -18,6 +18,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.problem import Problem
 from mbsim.integrators.positions import put_along
 from mbsim.integrators.radau5 import G0, G_IM, G_RE, TI, C, T
+from mbsim.integrators.radau5 import E as ERROR
 from mbsim.integrators.radau5 import Z as STAGES_AT
 from mbsim.integrators.scheme import FRESH, LAST_STEP, Method, in_workspace
 from mbsim.sensitivity.arrays import JOINTS, REMEMBERED, TWIN, UP, Variations
@@ -27,6 +28,8 @@ from mbsim.sensitivity.twin import half_step, set_parameter
 #: a point and f there.
 Z, F, REAL, REAL_D, PAIR, PAIR_D, POINT, SLOPE = 0, 3, 6, 7, 8, 10, 12, 13
 STAGES = 14
+#: By how much the error of order 3 overrates that of the step.
+OVERRATED = 100.0
 #: The iteration ends at a correction of this part of the derivative, or after so many, or where
 #: they get no smaller, which is rounding where they are below the third number.
 ENOUGH, MOST, ROUNDING = 1e-10, 12, 1e-5
@@ -161,11 +164,49 @@ def implicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k:
             return Code.NOT_CONVERGED
         before = size
     keep_polynomial(V, m, k)
+    code = estimate_error(V, scene, m, t, h, k, e)
+    if code != 0:
+        return code
     if V.words[REMEMBERED] > 0:
         for s in range(V.far.shape[1]):
             for j in range(V.far.shape[2]):
                 V.far[0, s, j] = 0.5 / e * (V.far[0, s, j] - V.far[1, s, j])
     return 0
+
+
+@jitable
+def estimate_error(
+    V: Variations, scene: Scene, m: Method, t: float, h: float, k: int, e: float
+) -> int:
+    """Leave the filtered error of the step of a derivative, over that; return a code.
+
+    It is the method's own, of order 3: far larger than what the step is off by.
+    """
+    p, twin = in_workspace(V.words[UP])[0], view(V.words[TWIN], Scene)
+    r, x, f = V.stage[REAL], V.stage[POINT], V.stage[SLOPE]
+    for i in range(len(m.y)):
+        r[i] = 0.0
+        for j in range(3):
+            r[i] += ERROR[j] * V.stage[Z + j, i] / h
+    for side in range(2):
+        sign = 1.0 if side == 0 else -1.0
+        set_parameter(V, twin, scene, k, sign * e)
+        for i in range(len(m.y)):
+            x[i] = m.y[i] + sign * e * V.d[k, i]
+        code = call_int(p.rhs, (p.context, t, 0.0, x, f))
+        if code != 0:
+            return code
+        for i in range(len(m.y)):
+            r[i] += sign * 0.5 / e * f[i]
+    if V.words[JOINTS] == 1:
+        put_along(p, m, t, m.y, r, x)
+    code = call_int(p.solve, (p.context, t, h, r, V.stage[REAL_D]))
+    error, whole = 0.0, 1.0 / V.size[k]
+    for i in range(len(m.y)):
+        error = max(error, abs(V.stage[REAL_D, i]) / V.scale[i])
+        whole = max(whole, abs(V.next[k, i]) / V.scale[i], abs(V.d[k, i]) / V.scale[i])
+    V.error[k] = error / whole / OVERRATED
+    return code
 
 
 @jitable
