@@ -61,27 +61,46 @@ def note_shift(V: Variations, scene: Scene, t: float, H: float, k: int) -> None:
 
 
 @jitable
-def note_memory(V: Variations, scene: Scene, t: float, H: float, k: int) -> None:
-    """Find what friction keeps of a change of branch, each side at its own time of that.
-
-    A little behind it, so that both ask for the branch that the run asks for.
-    """
-    twin, w, e = view(V.words[TWIN], Scene), V.work[0], half_step(V, k)
+def memory_beside(
+    V: Variations, scene: Scene, t: float, k: int, x: float, late: float, side: int
+) -> None:
+    """Leave what laws keep at a time `late` after t, with parameter k changed by x."""
+    twin, w = view(V.words[TWIN], Scene), V.work[0]
     p = in_workspace(V.words[UP])[0]
-    for side in range(2):
-        x = e if side == 0 else -e
-        set_parameter(V, twin, scene, k, x)
-        late = BEHIND * H + x * V.shift[k]
-        for i in range(len(w)):
-            w[i] = V.jump[BEFORE, i] + x * V.next[k, i] + late * V.jump[F_BEFORE, i]
-        if call_int(p.rhs, (p.context, t + late, 0.0, w, V.work[1])) != 0:
-            V.shift[k] = math.nan
-        for s in range(V.far.shape[1]):
-            for j in range(V.far.shape[2]):
-                V.far[side, s, j] = twin.work.memory[s, j] if twin.work.touching[s] == 1 else 0.0
+    set_parameter(V, twin, scene, k, x)
+    for i in range(len(w)):
+        w[i] = V.jump[BEFORE, i] + x * V.next[k, i] + late * V.jump[F_BEFORE, i]
+    if call_int(p.rhs, (p.context, t + late, 0.0, w, V.work[1])) != 0:
+        V.shift[k] = math.nan
     for s in range(V.far.shape[1]):
         for j in range(V.far.shape[2]):
-            V.memory[k, s, j] = 0.5 / e * (V.far[0, s, j] - V.far[1, s, j])
+            V.far[side, s, j] = twin.work.memory[s, j] if twin.work.touching[s] == 1 else 0.0
+
+
+@jitable
+def note_memory(V: Variations, scene: Scene, t: float, H: float, k: int) -> None:
+    """Find what friction keeps before and behind a change of branch.
+
+    Of what does not change a little before it: points of one body come to rest one by one, nearer
+    to each other than the difference is wide, and what a law keeps is another number then. Of what
+    changes a little behind it, each side at its own time.
+    """
+    margin, e = BEHIND * H, half_step(V, k)
+    e = min(e, 0.3 * margin / max(abs(V.shift[k]), 1e-300))
+    for turn in range(2):
+        for side in range(2):
+            x = e if side == 0 else -e
+            late = -margin if turn == 0 else margin + x * V.shift[k]
+            memory_beside(V, scene, t, k, x, late, side)
+        for s in range(V.far.shape[1]):
+            for j in range(V.far.shape[2]):
+                change = 0.5 / e * (V.far[0, s, j] - V.far[1, s, j])
+                if turn == 0:
+                    V.memory[k, s, j] = change
+                else:
+                    V.late[k, s, j] = change
+    for s in range(len(V.mode)):
+        V.mode[s] = scene.state.mode[s]
 
 
 @jitable
@@ -110,7 +129,7 @@ def carried_memory(V: Variations, scene: Scene, k: int, i: int) -> float:
         z = scene.slots.z[s]
         c = scene.kinds.contact[scene.pairs.kind[scene.slots.pair[s]]]
         if z >= 0 and z <= i < z + scene.contacts.carried[c]:
-            return V.memory[k, s, i - z]
+            return V.late[k, s, i - z]
     return 0.0
 
 
@@ -145,8 +164,9 @@ def cross(V: Variations, scene: Scene, t: float, y: F1, switched: bool, lost: F1
                 V.next[k, i] = begins - (V.jump[F_BEHIND, i] * shift if jumps else 0.0)
             elif jumps:
                 V.next[k, i] += (V.jump[F_BEFORE, i] - V.jump[F_BEHIND, i]) * shift
-        if switched and jumps:
-            # what is kept is that of the time of the change; the run has it of its own
-            for s in range(V.memory.shape[1]):
+        for s in range(len(V.mode) if switched else 0):
+            if scene.state.mode[s] != V.mode[s]:
+                # what is kept is that of each side's own time; the run has one time for all
                 for j in range(V.memory.shape[2]):
-                    V.memory[k, s, j] -= V.far[0, s, j] * shift
+                    rate = V.far[0, s, j] if jumps else 0.0
+                    V.memory[k, s, j] = V.late[k, s, j] - rate * shift

@@ -150,6 +150,8 @@ class Sensitivities:
             enough=np.full(1, max(ENOUGH, ENOUGH_TOL * tol)),
             bends=np.zeros(count, dtype=np.int64),
             jump=np.zeros((3, n)),
+            late=np.zeros((count, *shape)),
+            mode=np.zeros(shape[0]),
             line=np.zeros(1),
             shift=np.zeros(count),
             reason=np.zeros(count),
@@ -328,7 +330,8 @@ def _scale(system: System, n: int) -> Array:
     found[: len(of_a_body) * len(system.body_ids)] = of_a_body * len(system.body_ids)
     states = np.asarray(system.scene.states.offset, dtype=np.int64)
     found[states] = np.maximum(system.scene.states.scale, 1e-300)
-    for places in (system.scene.slots.x, system.scene.slots.z):
-        for s in np.flatnonzero(places >= 0):
-            found[places[s] : places[s] + 2] = length
+    # what friction carries is a stretch or a way over one, and follows the slip as exactly
+    places = system.scene.slots.x
+    for s in np.flatnonzero(places >= 0):
+        found[places[s] : places[s] + 2] = length
     return found
