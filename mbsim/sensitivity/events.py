@@ -18,6 +18,7 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, view
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
+from mbsim.core.problem import ASK
 from mbsim.integrators.scheme import in_workspace
 from mbsim.sensitivity.along import crossing, point_at
 from mbsim.sensitivity.arrays import (
@@ -70,7 +71,12 @@ def memory_beside(
     set_parameter(V, twin, scene, k, x)
     for i in range(len(w)):
         w[i] = V.jump[BEFORE, i] + x * V.next[k, i] + late * V.jump[F_BEFORE, i]
-    if call_int(p.rhs, (p.context, t + late, 0.0, w, V.work[1])) != 0:
+    if late > 0.0:
+        # what a law decides by rates of forces it decides where it is asked for its branch
+        code = min(call_int(p.switching, (p.context, t + late, ASK, w, V.work[1])), 0)
+    else:
+        code = call_int(p.rhs, (p.context, t + late, 0.0, w, V.work[1]))
+    if code != 0:
         V.shift[k] = math.nan
     for s in range(V.far.shape[1]):
         for j in range(V.far.shape[2]):
