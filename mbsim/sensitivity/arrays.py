@@ -52,6 +52,7 @@ class Variations(NamedTuple):
     bends: tags.Scratch[I1]  # (P,) 1 where the last step was taken along the motion
     jump: tags.Scratch[F2]  # (3, n) see BEFORE
     late: tags.Scratch[F3]  # (P, ns, most) of what laws remember behind a change of branch
+    middle: tags.Scratch[F3]  # (P, ns, most) mean of both sides there
     mode: tags.Scratch[F1]  # (ns,) `State.mode` before it
     line: tags.Scratch[F1]  # (1,) length of the straight line [T]
     shift: tags.Scratch[F1]  # (P,) by how much the end of the step is later, by the parameter

@@ -39,6 +39,10 @@ BRANCH = -1
 #: Times of changes are looked for along a straight line as long as this part of the problem's own
 #: time; how far behind them what friction keeps is asked for, over that.
 SPAN, BEHIND = 1e-4, 1e-5
+#: Changes of several points of a body follow each other: the difference is so much shorter then.
+SHORTER = 0.01
+#: By how much, over that, what is kept may differ between the run and both sides.
+ALIKE = 0.03
 #: So often a shorter difference is tried for the time of a change.
 TRIES = 4
 #: A jump of f below this part of its size is none.
@@ -48,7 +52,7 @@ NONE = 1e-9
 @jitable
 def note_shift(V: Variations, scene: Scene, t: float, H: float, k: int) -> None:
     """Find how fast the time t, at which a branch changes, moves with parameter k."""
-    twin, e = view(V.words[TWIN], Scene), half_step(V, k)
+    twin, e = view(V.words[TWIN], Scene), SHORTER * half_step(V, k)
     for j in range(len(twin.state.chattering)):
         twin.state.chattering[j] = scene.state.chattering[j]
     V.shift[k] = math.nan
@@ -105,6 +109,7 @@ def note_memory(V: Variations, scene: Scene, t: float, H: float, k: int) -> None
                     V.memory[k, s, j] = change
                 else:
                     V.late[k, s, j] = change
+                    V.middle[k, s, j] = 0.5 * (V.far[0, s, j] + V.far[1, s, j])
     for s in range(len(V.mode)):
         V.mode[s] = scene.state.mode[s]
 
@@ -140,6 +145,21 @@ def carried_memory(V: Variations, scene: Scene, k: int, i: int) -> float:
 
 
 @jitable
+def alike(V: Variations, scene: Scene, k: int, s: int) -> bool:
+    """Return whether slot s keeps behind a change what both sides of the difference keep there.
+
+    It does not where several points change in so short a time that these ask for other branches.
+    """
+    c = scene.kinds.contact[scene.pairs.kind[scene.slots.pair[s]]]
+    off, size = 0.0, 0.0
+    for j in range(scene.contacts.carried[c]):
+        kept = scene.state.memory[s, j]
+        off = max(off, abs(V.middle[k, s, j] - kept))
+        size = max(size, abs(kept))
+    return off <= ALIKE * size
+
+
+@jitable
 def cross(V: Variations, scene: Scene, t: float, y: F1, switched: bool, lost: F1) -> None:
     """Let all derivatives in `next` jump with what a commit has changed; y is behind it.
 
@@ -172,6 +192,8 @@ def cross(V: Variations, scene: Scene, t: float, y: F1, switched: bool, lost: F1
                 V.next[k, i] += (V.jump[F_BEFORE, i] - V.jump[F_BEHIND, i]) * shift
         for s in range(len(V.mode) if switched else 0):
             if scene.state.mode[s] != V.mode[s]:
+                if V.words[REMEMBERED] > 0 and not alike(V, scene, k, s):
+                    lost[k] = LOST_JUMP
                 # what is kept is that of each side's own time; the run has one time for all
                 for j in range(V.memory.shape[2]):
                     rate = V.far[0, s, j] if jumps else 0.0

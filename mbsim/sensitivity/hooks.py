@@ -38,6 +38,7 @@ from mbsim.sensitivity.arrays import (
     FITTED,
     JOINTS,
     LOST_FAILED,
+    LOST_LARGE,
     METHOD,
     ORDERED,
     OUTPUT,
@@ -56,6 +57,9 @@ from mbsim.sensitivity.twin import half_step, set_parameter
 
 #: Where the packed `Variations` stand: where those of MOREAU would, which takes no part in this.
 AT = Hook.STEPPING
+#: A parameter that moves bodies by their usual sizes when it changes by 1e-9 of itself moves them
+#: by chance.
+LARGEST = 1e9
 
 
 @jitable
@@ -168,6 +172,8 @@ def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int
         for i in range(n):
             V.kept[k, i] = V.d[k, i]
             V.d[k, i] = V.next[k, i]
+            if not abs(V.d[k, i]) * V.size[k] <= LARGEST * V.scale[i]:
+                lose(V, k, t, LOST_LARGE)
     return word
 
 
