@@ -75,9 +75,7 @@ def directions(system: System, options: Options) -> list[Direction]:
 
     def built(name: str, value: float) -> System:
         changed = read_model(deck, [*model.overrides, f"{name}={value!r}"])
-        return build(
-            changed, files, options.interpret_plugins, options.detector, lambda line: None
-        )
+        return build(changed, files, options.interpret_plugins, options.detector, lambda line: None)
 
     found = []
     for name in options.sensitivity:

@@ -5,7 +5,7 @@ derivative of what it computes is not: it would have the contact's stiffness ove
 whole step. So D' = f_y D + f_p is integrated along the step's polynomial up to where the contact
 changes and from there on. Where the force jumps by df as a contact begins or ends, the derivative
 does by -df dt*/dp (transfer condition; M. A. Aizerman, F. R. Gantmakher, Quart. J. Mech. Appl.
-Math. 11 (1958) 228).
+Math. 11 (1958) 385).
 """
 
 from __future__ import annotations
@@ -21,8 +21,36 @@ from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import ASK
 from mbsim.integrators.dopri5 import (
-    A21, A31, A32, A41, A42, A43, A51, A52, A53, A54, A61, A62, A63, A64, A65,
-    B1, B3, B4, B5, B6, C2, C3, C4, C5, E1, E3, E4, E5, E6, E7,
+    A21,
+    A31,
+    A32,
+    A41,
+    A42,
+    A43,
+    A51,
+    A52,
+    A53,
+    A54,
+    A61,
+    A62,
+    A63,
+    A64,
+    A65,
+    B1,
+    B3,
+    B4,
+    B5,
+    B6,
+    C2,
+    C3,
+    C4,
+    C5,
+    E1,
+    E3,
+    E4,
+    E5,
+    E6,
+    E7,
 )  # fmt: skip
 from mbsim.integrators.scheme import Method, in_workspace
 from mbsim.sensitivity.arrays import (
@@ -45,6 +73,8 @@ SECOND, THIRD, WORK = FIRST + 1, FIRST + 2, FIRST + 7
 MANY_PARTS, SHORTEST = 60, 1e-9
 #: What is no longer taken for rounding.
 ROUGHEST = 1e-5
+#: Of a part of the step: begin and end of the stretch it is in, its length in the step's, its time.
+Span = tuple[float, float, float, float]
 C = np.array((0.0, C2, C3, C4, C5, 1.0, 1.0))
 A = np.array(
     (
@@ -141,11 +171,18 @@ def clear_slope(
 
 @jitable
 def try_part(
-    V: Variations, scene: Scene, t: float, h: float, k: int, span: tuple[float, float, float, float], s: float, e: float
+    V: Variations,
+    scene: Scene,
+    t: float,
+    h: float,
+    k: int,
+    span: Span,
+    s: float,
+    e: float,
 ) -> tuple[int, float]:
     """Try a part of the step from s on; return a code, and the error over the derivative's size.
 
-    `span` is begin, end, the part's length in the step's, and its time.
+    What it leads to is left in `work`.
     """
     w, d = V.work, V.next[k]
     part, error, whole = span[3], 0.0, 1.0 / V.size[k]

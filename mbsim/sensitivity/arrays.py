@@ -12,19 +12,19 @@ from typing import NamedTuple
 from mbsim.core import tags
 from mbsim.core.arrays import F1, F2, F3, I1
 
-# numbers of `words`: the hooks of the run, and of the twin, that are passed on to; tables of the run's method, of the
+# numbers of `words`: the hooks of the run that are passed on to; tables of the run's method, of the
 # twin and of its two methods; addresses of an explicit method's functions, 0 for an implicit one;
-# coefficients of the dense output; numbers that a law remembers
-COMMIT, OUTPUT, METHOD, TWIN, UP, DOWN, ATTEMPT, FIT_DENSE, COEFFICIENTS, REMEMBERED = range(10)
+# how many numbers a law remembers
+COMMIT, OUTPUT, METHOD, TWIN, UP, DOWN, ATTEMPT, FIT_DENSE, REMEMBERED = range(9)
 # whether the last step has a polynomial; rows of results not taken yet; whether there are joints;
 # contacts that begin or end in the step; f of the twin; whether what changes is in order of time;
 # what touches on either side of a difference
-FITTED, ROWS, JOINTS, CHANGES, RHS, ORDERED, ALIKE = range(10, 17)
+FITTED, ROWS, JOINTS, CHANGES, RHS, ORDERED, ALIKE = range(9, 16)
 # evaluations beside the run; derivatives of steps that were taken along the motion
-ASKED, BENT = 18, 19
+ASKED, BENT = 17, 18
 # whether points are on a straight line instead of on the step's polynomial
-STRAIGHT = 20
-WORDS = 21
+STRAIGHT = 19
+WORDS = 20
 #: Rows of `Variations.jump`: y before the commit, f before and behind it.
 BEFORE, F_BEFORE, F_BEHIND = range(3)
 #: Contacts that may begin or end within one step.

@@ -5,9 +5,8 @@ With y+ = R(t, y-) at the time t* of the change, and f- and f+ on its sides,
     D+ = R_y D- + R_p + (dR/dt - f+) dt*/dp,
 
 R being y itself but for what friction carries, which begins as another number (transfer condition;
-V. Saltykov, and W. F. Feehery, J. E. Tolsma, P. I. Barton, Appl. Numer. Math. 25 (1997) 41). dt*/dp
-is found as the time was: where both sides of the difference, carried on by the step's polynomial,
-ask for the other branch.
+S. Galan, W. F. Feehery, P. I. Barton, Appl. Numer. Math. 31 (1999) 17). dt*/dp is found as
+the time was: where both sides of the difference, carried on along f-, ask for the other branch.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import ASK
 from mbsim.integrators.scheme import in_workspace
-from mbsim.sensitivity.along import crossing, point_at
+from mbsim.sensitivity.along import crossing
 from mbsim.sensitivity.arrays import (
     BEFORE,
     F_BEFORE,

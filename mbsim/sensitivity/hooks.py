@@ -133,7 +133,7 @@ def take_step(V: Variations, scene: Scene, m: Method, t: float, h: float) -> Non
 
 
 def rhs_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
-    """f of the twin, and which slots touch there."""
+    """F of the twin, and which slots touch there."""
     twin = view(context, Scene)
     V = view(twin.world.hooks[AT], Variations)
     code = call_int(V.words[RHS], (context, t, h, a, b))

@@ -167,9 +167,7 @@ def refused(system: System, settings: Any) -> str | None:
     """Return why sensitivities are not for a run, None where they are."""
     model = system.model
     if settings.integrator not in ("AUTO", "DOPRI5", "DOP853", "RADAU5"):
-        return (
-            f"integrator {settings.integrator} has none; take AUTO, DOPRI5, DOP853 or RADAU5"
-        )
+        return f"integrator {settings.integrator} has none; take AUTO, DOPRI5, DOP853 or RADAU5"
     if system.needs_fcl:
         return "FCL finds contacts of this model, whose normals scatter by 2e-6"
     stages = [stage.simulation for stage in settings.stages]
@@ -182,5 +180,3 @@ def refused(system: System, settings: Any) -> str | None:
     if system.reader is not None:
         return "subroutines that look at the model by py_sysfnc are not built"
     return None
-
-

@@ -40,7 +40,7 @@ ENOUGH, ENOUGH_TOL = 1e-9, 10.0
 _NO_SIGNALS = ("time", "state/", "contact_points/", "events")
 _WHY = {
     at.LOST_FAILED: "the equations beside the run could not be evaluated or solved",
-    at.LOST_JUMP: "forces or what friction keeps jump, and how the time of that changes is not known",
+    at.LOST_JUMP: "forces jump, or what friction keeps; how the time of that moves is unknown",
     at.LOST_GRAZING: "an event is met with next to no speed: its time has no derivative",
     at.LOST_LARGE: "it has grown beyond all bounds: the motion is chaotic",
 }
