@@ -30,6 +30,7 @@ from mbsim.results.form import (
 from mbsim.results.mapping import SignalMapping
 from mbsim.results.names import PARTS, compact, is_pattern, matching, nearest, order, parts_of
 from mbsim.results.opening import opened_file
+from mbsim.results.sensitivities import WithSensitivities
 
 if TYPE_CHECKING:
     import h5py
@@ -56,7 +57,7 @@ _NO_SIGNALS = ("state/", "contact_points/", "errors/", "sensitivity/")
 _NO_KEYS = ("checkpoint/", "graphics/", "markers", "connections")
 
 
-class Results(SignalMapping):
+class Results(SignalMapping, WithSensitivities):
     """What a run recorded; `results["bodies/2/position"]` is an array over output times.
 
     A name may end in ``/x``, ``/y``, ``/z`` or ``/mag`` (a quaternion also in ``/w``, a request
@@ -241,37 +242,6 @@ class Results(SignalMapping):
     def errors(self) -> Errors:
         """Error bars of a run with ``verify``; names as those of signals."""
         return Errors(self)
-
-    def sensitivity(self, name: str, parameter: str) -> Any:
-        """Return the derivative of a signal with respect to a parameter of the deck.
-
-        Parameters
-        ----------
-        name : str
-            Of the signal, as `results[...]` takes it.
-        parameter : str
-            One of those that the run was asked for: ``Force_Contact[301].mu_dynamic``.
-
-        Returns
-        -------
-        ndarray
-            Of the signal's shape; NaN from where it is not known any more.
-
-        Raises
-        ------
-        UnknownSignal
-            If the run has no such derivative.
-        """
-        from mbsim.results.sensitivities import derivative
-
-        return derivative(self, name, parameter)
-
-    @property
-    @reads
-    def parameters(self) -> dict[str, dict[str, Any]]:
-        """Parameters of which there are sensitivities: value, time until which they are known."""
-        group = self._open().get("sensitivity")
-        return {} if group is None else {name: facts_of(item) for name, item in group.items()}
 
     def find(self, name: str) -> list[str]:
         """Return the names of signals that a name stands for; a plain one stands for itself.

@@ -163,10 +163,10 @@ class Methods:
         every = EVERY if len(self.system.body_ids) <= FEW else EVERY_OF_MANY
         self.system.scene.audit.plan[AUDIT_EVERY] = EVERY_IMPLICIT if running.implicit else every
         probe = self.explicit if running is self.other else None
-        bound = bind(running, problem, self.arrays, probe)
+        steps, (table, workspace) = bind(running, problem, self.arrays, probe)
         if self.sensitivities is not None:
-            self.sensitivities.bind(running, problem, bound[1][0])
-        return problem, linearised, bound
+            self.sensitivities.bind(running, problem, table)
+        return problem, linearised, (steps, (table, workspace))
 
     def follow(self, sensitivities: Sensitivities) -> None:
         """Let derivatives be carried along with every step from here on."""

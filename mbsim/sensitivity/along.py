@@ -16,7 +16,7 @@ import numpy as np
 
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, view
-from mbsim.core.arrays import F1, F2
+from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import ASK
@@ -150,12 +150,11 @@ def clear_slope(
     begin: float,
     end: float,
     asked: float,
-    w: F2,
     row: int,
     e: float,
 ) -> int:
-    """Write D' at a part of the step, within begin and end, into a row; return a code."""
-    off, width, step = NEAREST, end - begin, e
+    """Write D' at a part of the step, within begin and end, into a row of `work`; return a code."""
+    w, off, width, step = V.work, NEAREST, end - begin, e
     while True:
         s = min(max(asked, begin + off * width), end - off * width)
         code = slope_at(V, scene, t, h, k, s, w[STAGE], step, w[row])
@@ -193,7 +192,7 @@ def try_part(
                 rise += A[stage, j] * w[FIRST + j, i]
             w[STAGE, i] = d[i] + part * rise
         at = s + C[stage] * span[2]
-        code = clear_slope(V, scene, t, h, k, span[0], span[1], at, w, FIRST + stage, e)
+        code = clear_slope(V, scene, t, h, k, span[0], span[1], at, FIRST + stage, e)
         if code != 0:
             return code, 0.0
     for i in range(len(d)):
