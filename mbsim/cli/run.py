@@ -94,6 +94,13 @@ _METHODS = ", ".join(f"{name} ({what})" for name, what in METHODS.items())
     type=click.Choice(["once", "full"]),
     help="Run again with another method, and give error bars; full: with two or three.",
 )
+@click.option(
+    "--sensitivity",
+    multiple=True,
+    metavar="ELEMENT[ID].ATTRIBUTE",
+    help="Record the derivatives of all signals with respect to a parameter of the deck, e.g. "
+    "'Force_Contact[301].mu_dynamic'; may be repeated.",
+)
 @click.option("--profile", is_flag=True, help="Print where the time went.")
 def command(
     model: str,

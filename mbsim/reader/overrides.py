@@ -125,3 +125,22 @@ def _set(node: Node, name: str, value: str, origin: str, known: list[str] | None
             f"{node.tag} has no attribute {name}{close or '; known: ' + ', '.join(known)}"
         )
     node.attributes.append(Attribute(name, value, node.line, origin))
+
+
+def value_of(sections: Sequence[Node], name: str) -> str | None:
+    """Return the text of the attribute that ``Element[id].attribute`` names, None if not given.
+
+    Raises
+    ------
+    ModelError
+        If the form is wrong, or the element is not there.
+    """
+    match = _FORM.fullmatch(f"{name}=")
+    if match is None:
+        raise ModelError(f"{name}: must be Element[id].attribute")
+    element, index, turn, attribute, _ = match.groups()
+    try:
+        found = _find(sections, element, index, int(turn or 1)).find(attribute)
+    except LookupError as error:
+        raise ModelError(f"{name}: {error.args[0]}") from None
+    return found.value if found is not None else None

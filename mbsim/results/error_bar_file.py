@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,14 +37,29 @@ def over_time(results: Results) -> dict[str, Any]:
 def kept(results: Results, bars: Bars) -> Results:
     """Write error bars into the file of results; return it as it is then."""
     until = {"reproducible_until": bars.reproducible_until}
+    return with_tables(results, bars.tables, dict.fromkeys(bars.tables, until))
+
+
+def with_tables(
+    results: Results, tables: Mapping[str, Any], about: Mapping[str, Mapping[str, Any]]
+) -> Results:
+    """Write datasets, and attributes of datasets and groups, into the file of results.
+
+    Returns
+    -------
+    Results
+        As the file is then.
+    """
     if results.path is None:
         file, *_ = results.located("time")
-        for name, table in bars.tables.items():
-            file.create_dataset(name, data=table).attrs.update(until)
+        for name, table in tables.items():
+            file.create_dataset(name, data=table)
+        for name, facts in about.items():
+            file[name].attrs.update(facts)
         return results
     path = results.path
     results.close()
     store = Store(path, resume=True)
-    store.update(values=bars.tables, attributes=dict.fromkeys(bars.tables, until))
+    store.update(values=tables, attributes=about)
     store.finish()
     return open_results(path)

@@ -30,6 +30,7 @@ from mbsim.results.form import (
 from mbsim.results.mapping import SignalMapping
 from mbsim.results.names import PARTS, compact, is_pattern, matching, nearest, order, parts_of
 from mbsim.results.opening import opened_file
+from mbsim.results.sensitivities import WithSensitivities
 
 if TYPE_CHECKING:
     import h5py
@@ -51,12 +52,12 @@ _LISTS = ("columns", "measures")
 #: Groups of other things than elements.
 _NO_ELEMENTS = ("checkpoint", "stats", "audit", "state", "energy", "requests", "graphics")
 #: Datasets that are no signals, whatever their shapes.
-_NO_SIGNALS = ("state/", "contact_points/", "errors/")
+_NO_SIGNALS = ("state/", "contact_points/", "errors/", "sensitivity/")
 #: What `keys` leaves out: what a run goes on from, and what pictures are made of.
 _NO_KEYS = ("checkpoint/", "graphics/", "markers", "connections")
 
 
-class Results(SignalMapping):
+class Results(SignalMapping, WithSensitivities):
     """What a run recorded; `results["bodies/2/position"]` is an array over output times.
 
     A name may end in ``/x``, ``/y``, ``/z`` or ``/mag`` (a quaternion also in ``/w``, a request

@@ -100,7 +100,7 @@ class Recorder:
         bare: bool = False,
     ) -> None:
         self.system, self._bare = system, bare and directory is None
-        self._asked = SignalFilter(asked)
+        self.asked, self._asked = asked, SignalFilter(asked)
         self._identity, self.directory = Identity(system, how), directory
         self.checkpoint: dict[str, Table] = {}
         self._watch = Watch(acting(system))

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from mbsim.compile_model.timetable import Timetable
     from mbsim.results.audit import Audit
     from mbsim.run.dumping import ContactProblems
+    from mbsim.sensitivity.setup import Sensitivities
 
 #: Evaluations of the first call of compiled code, see `next_budget`.
 FIRST_BUDGET = 200
@@ -88,13 +89,14 @@ class Runner:
         self._before: dict[str, Any] | None = None  # checkpoint to go on from while it begins
         self._first: dict[str, Any] | None = None  # that of the run's begin, while AUTO goes back
         self.dump: ContactProblems | None = None
+        self.sensitivities: Sensitivities | None = None
 
     def _warn_of_states(self) -> None:
         """Say of subroutines with states that VERLET holds their friction back."""
         contacts = self.system.scene.contacts
         for id, numbers in zip(self.system.contact_ids, contacts.memory, strict=True):
             if numbers > 0 and self.settings.integrator == "VERLET":
-                self._say(
+                self.say(
                     f"Force_Contact[{id}]: VERLET holds friction back to a quarter of what would "
                     "stop the slip in a step: what its subroutine holds by states creeps"
                 )
@@ -115,7 +117,7 @@ class Runner:
         """Return when the first Simulate begins."""
         return self.settings.stages[0].simulation.start_time
 
-    def _say(self, line: str) -> None:
+    def say(self, line: str) -> None:
         """Tell something in the log and to the user."""
         self.log.line(line)
         self.tell(line)
@@ -243,6 +245,8 @@ class Runner:
     def _take(self) -> None:
         """Let the recorder have the rows that there are."""
         with self._undisturbed():
+            if self.sensitivities is not None:
+                self.sensitivities.take()
             self.recorder.take()
 
     def ask_to_stop(self, number: int) -> None:
@@ -291,12 +295,12 @@ class Runner:
         method.counts[scheme.NEXT_OUTPUT] = 1
         t, goes_on = simulation.start_time, True
         if self.commands.interrupts(self.stage):
-            self.commands.assemble(self.stage, self.hooks, t, method.y, self.log.line, self._say)
+            self.commands.assemble(self.stage, self.hooks, t, method.y, self.log.line, self.say)
         if simulation.analysis_type == "STATIC":
-            balance_bodies(self.system, self.hooks, simulation, method.y, method.k[0], self._say)
+            balance_bodies(self.system, self.hooks, simulation, method.y, method.k[0], self.say)
             goes_on = False
         if goes_on and self.methods.explicit.order > 0.0:
-            limit_first(self.system, self.hooks, t, method, self._say)
+            limit_first(self.system, self.hooks, t, method, self.say)
         if (
             goes_on
             and self.problem.arrive
@@ -375,6 +379,8 @@ class Runner:
         if self.stage == 0 and not method.counts[scheme.STEPS] and self.methods.may_begin_anew:
             self._first = self.checkpoint()
             self.recorder.mark()
+            if self.sensitivities is not None:
+                self.sensitivities.mark()
         while True:
             began, before = time.perf_counter(), int(method.counts[scheme.EVALUATIONS])
             outcome = self._advance(
@@ -434,6 +440,8 @@ class Runner:
         first, self._first = self._first, None
         self.restore(first)
         self.recorder.go_back()
+        if self.sensitivities is not None:
+            self.sensitivities.go_back()
         if self.dump is not None:
             self.dump.begin_anew()
 

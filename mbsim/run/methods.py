@@ -27,6 +27,7 @@ from mbsim.integrators.changing import (
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
     from mbsim.core.problem import Problem
+    from mbsim.sensitivity.setup import Sensitivities
 
 #: Bodies of the largest model for which AUTO looks whether it is stiff.
 MOST_BODIES = 300
@@ -115,6 +116,7 @@ class Methods:
             self.arrays.memory[scheme.BEGUN] = start
         if alone:
             self.arrays.memory[scheme.KEEPS_TO_BOUND] = 1.0
+        self.sensitivities: Sensitivities | None = None
         self.changes = 0
         #: When AUTO changed over last, and the work by then.
         self._since = (start, 0.0)
@@ -161,7 +163,16 @@ class Methods:
         every = EVERY if len(self.system.body_ids) <= FEW else EVERY_OF_MANY
         self.system.scene.audit.plan[AUDIT_EVERY] = EVERY_IMPLICIT if running.implicit else every
         probe = self.explicit if running is self.other else None
-        return problem, linearised, bind(running, problem, self.arrays, probe)
+        steps, (table, workspace) = bind(running, problem, self.arrays, probe)
+        if self.sensitivities is not None:
+            self.sensitivities.bind(running, problem, table)
+        return problem, linearised, (steps, (table, workspace))
+
+    def follow(self, sensitivities: Sensitivities) -> None:
+        """Let derivatives be carried along with every step from here on."""
+        self.sensitivities = sensitivities
+        self.problem = sensitivities.hooked(self.problem)
+        self.bind()
 
     def time_scene(self) -> None:
         """Let the scene's hooks and laws be timed where a profile runs."""

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from mbsim.errors import MbsimError
 
@@ -35,6 +36,10 @@ class Options:
     progress: Progress | None = None
     notify: Notify | None = None
     verify: bool | str = False
+    # parameters, Element[id].attribute, of which derivatives are carried along; what they are read
+    # from, None for the model's file
+    sensitivity: tuple[str, ...] = ()
+    source: Any = None
     # of a rerun that verifies: what tolerances are multiplied by, and what bounds steps and work
     tighter: float = 1.0
     least_steps: float = 0.0

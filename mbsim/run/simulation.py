@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from mbsim.results.audit import Audit
     from mbsim.results.log import RunLog
     from mbsim.results.reading import Results
+    from mbsim.sensitivity.parameters import Direction
 
 
 #: Signals that end a run at the next return from compiled code, what there is being kept.
@@ -157,6 +158,7 @@ def simulate(
     notify: Notify | None = None,
     profile: bool = False,
     verify: bool | str = False,
+    sensitivity: Sequence[str] = (),
 ) -> Results:
     """Run a model and return its results.
 
@@ -205,6 +207,9 @@ def simulate(
         Count where the time goes: ``profile_*`` of `Results.stats`.
     verify : bool or "full"
         Run once more, or two to three times, for error bars: `Results.errors`.
+    sensitivity : sequence of str
+        Parameters, ``Element[id].attribute``, by which derivatives of all signals are recorded:
+        `Results.sensitivity`.
 
     Raises
     ------
@@ -232,6 +237,8 @@ def simulate(
         progress=progress,
         notify=notify,
         verify=verify,
+        sensitivity=tuple(sensitivity),
+        source=None if isinstance(model, Model) else model,
     )
     if verify not in (False, True, "full"):
         raise ModelError(f'verify={verify!r}: False, True and "full" are allowed')
@@ -284,6 +291,7 @@ def _run(model: Model, options: Options) -> Results:
     if options.contact_points:
         system.scene = system.scene._replace(rows=with_points(system.scene.rows))
     asked = settings, options.signals, options.bare
+    found = _directions(settings, system, options)
     recorder = Recorder(system, attributes, folder, options.resume, *asked)
     try:
         recorder.check_room(output_rows(settings))
@@ -302,6 +310,10 @@ def _run(model: Model, options: Options) -> Results:
                     _goes_on(runner)
                 else:
                     runner.start(options.allow_overlap)
+                if found:
+                    from mbsim.run.sensitivity import attach
+
+                    attach(runner, found)
                 if options.dump_fclib is not None:
                     runner.dump_every(options.dump_fclib, options.resume)
                 runner.most_evaluations = options.most_evaluations
@@ -326,6 +338,17 @@ def _run(model: Model, options: Options) -> Results:
             results = _finish(runner, status, time.perf_counter() - began, compiled)
     assert results is not None  # a finished run has rows
     return results
+
+
+def _directions(settings: Settings, system: System, options: Options) -> list[Direction]:
+    """Return how the parameters of which derivatives are asked for change the run."""
+    if not options.sensitivity:
+        return []
+    from mbsim.run import sensitivity
+
+    sensitivity.check(settings, system, options)
+    with part("build"):
+        return sensitivity.directions(system, options)
 
 
 def begin_log(log: RunLog, system: System, notes: Iterable[str]) -> None:
@@ -461,5 +484,11 @@ def _keep(
         recorder.flush(runner.checkpoint())
     contacts = runner.system.scene.log.contacts
     last = None if runner.torn else runner.checkpoint
+    for line in runner.sensitivities.lines if runner.sensitivities is not None else ():
+        runner.say(line)
     results: Results = recorder.close(status, stats, contacts, audit, last, close_log)
-    return results
+    if runner.sensitivities is None:
+        return results
+    from mbsim.results.error_bar_file import with_tables
+
+    return with_tables(results, *runner.sensitivities.tables(runner.recorder.asked))

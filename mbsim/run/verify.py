@@ -46,7 +46,13 @@ class Reruns:
         self.model, self.run = model, run
         self.tell = options.notify or (lambda line: None)
         self.options = replace(
-            options, output=None, resume=False, dump_fclib=None, verify=False, notify=None
+            options,
+            output=None,
+            resume=False,
+            dump_fclib=None,
+            verify=False,
+            notify=None,
+            sensitivity=(),
         )
         self.held = over_time(results)
         self.events, self.peaks = results["events"], _peaks(results)

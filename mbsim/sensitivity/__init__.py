@@ -1,0 +1,1 @@
+"""Sensitivities: derivatives of a run's motion with respect to parameters of its deck."""

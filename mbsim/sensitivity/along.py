@@ -1,0 +1,410 @@
+"""Derivatives along the motion within one step, where a contact begins or ends in it.
+
+A step that just reaches into a contact is right to tol, for the force is small there; the
+derivative of what it computes is not: it would have the contact's stiffness over a part of the
+whole step. So D' = f_y D + f_p is integrated along the step's polynomial up to where the contact
+changes and from there on. Where the force jumps by df as a contact begins or ends, the derivative
+does by -df dt*/dp (transfer condition; M. A. Aizerman, F. R. Gantmakher, Quart. J. Mech. Appl.
+Math. 11 (1958) 385).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mbsim.arrays.scene import Scene
+from mbsim.core.address import call_int, view
+from mbsim.core.arrays import F1
+from mbsim.core.codes import Code
+from mbsim.core.jitable import jitable
+from mbsim.core.problem import ASK
+from mbsim.integrators.dopri5 import (
+    A21,
+    A31,
+    A32,
+    A41,
+    A42,
+    A43,
+    A51,
+    A52,
+    A53,
+    A54,
+    A61,
+    A62,
+    A63,
+    A64,
+    A65,
+    B1,
+    B3,
+    B4,
+    B5,
+    B6,
+    C2,
+    C3,
+    C4,
+    C5,
+    E1,
+    E3,
+    E4,
+    E5,
+    E6,
+    E7,
+)  # fmt: skip
+from mbsim.integrators.scheme import Method, in_workspace
+from mbsim.sensitivity.arrays import (
+    ALIKE,
+    BEFORE,
+    CHANGES,
+    F_BEFORE,
+    MOST_CHANGES,
+    STRAIGHT,
+    TWIN,
+    UP,
+    Variations,
+)
+from mbsim.sensitivity.twin import half_step, set_parameter
+
+#: Rows of `Variations.work`: a point, f on either side, D at a stage, its slopes.
+POINT, UPPER, LOWER, STAGE, FIRST = range(5)
+SECOND, THIRD, WORK = FIRST + 1, FIRST + 2, FIRST + 7
+#: After so many tries less is asked for; the shortest part of a step.
+MANY_PARTS, SHORTEST = 60, 1e-9
+#: What is no longer taken for rounding.
+ROUGHEST = 1e-5
+#: Of a part of the step: begin and end of the stretch it is in, its length in the step's, its time.
+Span = tuple[float, float, float, float]
+C = np.array((0.0, C2, C3, C4, C5, 1.0, 1.0))
+A = np.array(
+    (
+        (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        (A21, 0.0, 0.0, 0.0, 0.0, 0.0),
+        (A31, A32, 0.0, 0.0, 0.0, 0.0),
+        (A41, A42, A43, 0.0, 0.0, 0.0),
+        (A51, A52, A53, A54, 0.0, 0.0),
+        (A61, A62, A63, A64, A65, 0.0),
+        (B1, 0.0, B3, B4, B5, B6),
+    )
+)
+E = np.array((E1, 0.0, E3, E4, E5, E6, E7))
+#: Parts of a stretch by which its ends are left, until both sides of a difference touch alike.
+NEAREST, FARTHER = 1e-12, 4.0
+#: A difference is no smaller than this part of the usual one.
+LEAST = 1e-4
+#: A change is looked for within so many lengths of a step of where the run has it.
+FARTHEST = 100.0
+#: A jump of f counts if what it does to y over the step is more than this part of the usual size.
+JUMPS = 1e-13
+
+
+@jitable
+def point_at(V: Variations, s: float, out: F1) -> None:
+    """Write the state at the part s of the step, or of a straight line to its end."""
+    path, r = V.path, 1.0 - s
+    if V.words[STRAIGHT] == 1:
+        for i in range(len(out)):
+            out[i] = V.jump[BEFORE, i] + (s - 1.0) * V.line[0] * V.jump[F_BEFORE, i]
+        return
+    last = len(path) - 1
+    for i in range(len(out)):
+        value = path[last, i]
+        for j in range(last - 1, -1, -1):
+            value = path[j, i] + (s if j % 2 == 0 else r) * value
+        out[i] = value
+
+
+@jitable
+def slope_at(
+    V: Variations, scene: Scene, t: float, h: float, k: int, s: float, d: F1, e: float, out: F1
+) -> int:
+    """Write D' at the part s of the step for a derivative d; return a code."""
+    twin, w = view(V.words[TWIN], Scene), V.work
+    p = in_workspace(V.words[UP])[0]
+    for side in range(2):
+        sign = 1.0 if side == 0 else -1.0
+        set_parameter(V, twin, scene, k, sign * e)
+        point_at(V, s, w[POINT])
+        for i in range(len(out)):
+            w[POINT, i] += sign * e * d[i]
+        f = w[UPPER] if side == 0 else w[LOWER]
+        code = call_int(p.rhs, (p.context, t + s * h, s * h, w[POINT], f))
+        if code != 0:
+            return code
+        count, sum = twin.work.hit[len(twin.work.hit) - 1], 0
+        for j in range(count):
+            sum += 1 + twin.work.hit[j]
+        V.words[ALIKE + side] = sum
+    for i in range(len(out)):
+        out[i] = 0.5 / e * (w[UPPER, i] - w[LOWER, i])
+    return 0
+
+
+@jitable
+def clear_slope(
+    V: Variations,
+    scene: Scene,
+    t: float,
+    h: float,
+    k: int,
+    begin: float,
+    end: float,
+    asked: float,
+    row: int,
+    e: float,
+) -> int:
+    """Write D' at a part of the step, within begin and end, into a row of `work`; return a code."""
+    w, off, width, step = V.work, NEAREST, end - begin, e
+    while True:
+        s = min(max(asked, begin + off * width), end - off * width)
+        code = slope_at(V, scene, t, h, k, s, w[STAGE], step, w[row])
+        if code != 0 or V.words[ALIKE] == V.words[ALIKE + 1]:
+            return code
+        if off >= 0.5:
+            # a stretch so short that a smaller difference, which is less exact, matters little
+            step *= 0.1
+            if step < LEAST * e:
+                return 0
+        off = min(0.5, FARTHER * off)
+
+
+@jitable
+def try_part(
+    V: Variations,
+    scene: Scene,
+    t: float,
+    h: float,
+    k: int,
+    span: Span,
+    s: float,
+    e: float,
+) -> tuple[int, float]:
+    """Try a part of the step from s on; return a code, and the error over the derivative's size.
+
+    What it leads to is left in `work`.
+    """
+    w, d = V.work, V.next[k]
+    part, error, whole = span[3], 0.0, 1.0 / V.size[k]
+    for stage in range(7):
+        for i in range(len(d)):
+            rise = 0.0
+            for j in range(stage):
+                rise += A[stage, j] * w[FIRST + j, i]
+            w[STAGE, i] = d[i] + part * rise
+        at = s + C[stage] * span[2]
+        code = clear_slope(V, scene, t, h, k, span[0], span[1], at, FIRST + stage, e)
+        if code != 0:
+            return code, 0.0
+    for i in range(len(d)):
+        off = 0.0
+        for j in range(7):
+            off += E[j] * w[FIRST + j, i]
+        error = max(error, abs(part * off) / V.scale[i])
+        whole = max(whole, abs(w[STAGE, i]) / V.scale[i], abs(d[i]) / V.scale[i])
+    return 0, error / whole
+
+
+@jitable
+def integrate(
+    V: Variations, scene: Scene, t: float, h: float, k: int, begin: float, end: float, e: float
+) -> int:
+    """Carry the derivative in `next` from one part of the step to another; return a code.
+
+    By the method of order 5 of Dormand and Prince, as exactly as `enough` asks. Where forces bend
+    the steps get short.
+    """
+    w, d, s, part, most = V.work, V.next[k], begin, end - begin, V.enough[0]
+    tries = 0
+    while s < end:
+        tries += 1
+        if tries % MANY_PARTS == 0:
+            # what is left is rounding of forces
+            most *= 10.0
+            if most > ROUGHEST:
+                return Code.NOT_CONVERGED
+        last = s + 1.0001 * part >= end
+        part = end - s if last else part
+        code, error = try_part(V, scene, t, h, k, (begin, end, part, part * h), s, e)
+        if code != 0:
+            return code
+        shortest = part <= SHORTEST or part * h <= 1e-15 * abs(t)
+        if error <= most or shortest:
+            for i in range(len(d)):
+                d[i] = w[STAGE, i]
+            s = end if last else s + part
+        part *= min(4.0, max(0.1, 0.9 * (most / max(error, 1e-12)) ** 0.2))
+    return 0
+
+
+@jitable
+def touches(
+    V: Variations, scene: Scene, t: float, h: float, k: int, s: float, e: float, slot: int
+) -> int:
+    """Return 1 if a slot touches at the part s of the step, moved by e; 0 if not, less a code.
+
+    With a slot below 0: if a force is on another branch.
+    """
+    twin, w = view(V.words[TWIN], Scene), V.work
+    p = in_workspace(V.words[UP])[0]
+    point_at(V, s, w[POINT])
+    if e != 0.0:
+        for i in range(V.next.shape[1]):
+            w[POINT, i] += e * V.next[k, i]
+    if slot < 0:
+        # asked of all branches at once
+        answer = call_int(p.switching, (p.context, t + s * h, ASK, w[POINT], w[UPPER]))
+        return min(answer, 1)
+    code = call_int(p.rhs, (p.context, t + s * h, s * h, w[POINT], w[UPPER]))
+    return -code if code != 0 else twin.work.touching[slot]
+
+
+@jitable
+def crossing(
+    V: Variations, scene: Scene, t: float, h: float, k: int, e: float, slot: int, around: float
+) -> float:
+    """Return at which part of the step a slot begins or ends to touch; NaN where it does not.
+
+    Looked for in all of it, or no farther than `around` from where it does with e = 0.
+    """
+    set_parameter(V, view(V.words[TWIN], Scene), scene, k, e)
+    before = 1 - scene.work.touching[slot] if slot >= 0 else 0
+    low, high = 0.0, 1.0
+    if around > 0.0:
+        low, high = around, around
+        reach = 1e-9
+        while reach < FARTHEST:
+            low, high = around - reach, around + reach
+            if touches(V, scene, t, h, k, low, e, slot) == before:
+                if touches(V, scene, t, h, k, high, e, slot) == 1 - before:
+                    break
+            reach *= 8.0
+        if reach >= FARTHEST:
+            return math.nan
+    while True:
+        middle = 0.5 * (low + high)
+        if middle <= low or middle >= high or high - low < 1e-16:
+            return high
+        found = touches(V, scene, t, h, k, middle, e, slot)
+        if found < 0:
+            return math.nan
+        if found == before:
+            low = middle
+        else:
+            high = middle
+
+
+@jitable
+def list_changes(V: Variations, scene: Scene, t: float, h: float) -> bool:
+    """List the contacts that begin or end in the step in order of time; return whether all are."""
+    count, now, then = 0, scene.work.hit, scene.state.hit
+    for side in range(2):
+        hit = now if side == 0 else then
+        for j in range(hit[len(hit) - 1]):
+            s = hit[j]
+            if scene.work.touching[s] == scene.state.touching[s]:
+                continue
+            if count == MOST_CHANGES:
+                return False
+            V.change[count, 0] = float(s)
+            count += 1
+    V.words[CHANGES] = count
+    return True
+
+
+@jitable
+def order_changes(V: Variations, scene: Scene, t: float, h: float) -> bool:
+    """Find when each listed contact changes, and order them; return whether all were found."""
+    for j in range(V.words[CHANGES]):
+        when = crossing(V, scene, t, h, 0, 0.0, int(V.change[j, 0]), 0.0)
+        if not when >= 0.0:
+            return False
+        slot, place = V.change[j, 0], j
+        while place > 0 and V.change[place - 1, 1] > when:
+            V.change[place, 0], V.change[place, 1] = V.change[place - 1, 0], V.change[place - 1, 1]
+            place -= 1
+        V.change[place, 0], V.change[place, 1] = slot, when
+    return True
+
+
+@jitable
+def jump_at(V: Variations, scene: Scene, t: float, h: float, s: float) -> float:
+    """Leave by how much f falls at the part s in a row; return how much it moves in the step."""
+    twin, w, largest = view(V.words[TWIN], Scene), V.work, 0.0
+    p = in_workspace(V.words[UP])[0]
+    set_parameter(V, twin, scene, 0, 0.0)
+    near = max(1e-13, 4e-16 * abs(t) / h)
+    for side in range(2):
+        at = max(s - near, 0.0) if side == 0 else min(s + near, 1.0)
+        point_at(V, at, w[POINT])
+        call_int(p.rhs, (p.context, t + at * h, at * h, w[POINT], w[FIRST + side]))
+    for i in range(V.next.shape[1]):
+        w[THIRD, i] = w[FIRST, i] - w[SECOND, i]
+        largest = max(largest, abs(w[THIRD, i]) * h / V.scale[i])
+    return largest
+
+
+@jitable
+def transfer(V: Variations, scene: Scene, t: float, h: float, k: int, j: int, e: float) -> int:
+    """Let the derivative jump where listed contact j changes; return a code."""
+    slot, s, w = int(V.change[j, 0]), V.change[j, 1], V.work
+    if jump_at(V, scene, t, h, s) <= JUMPS:
+        return 0
+    up = crossing(V, scene, t, h, k, e, slot, s)
+    down = crossing(V, scene, t, h, k, -e, slot, s)
+    if not math.isfinite(up - down):
+        return Code.NOT_CONVERGED
+    # the rows were used meanwhile
+    jump_at(V, scene, t, h, s)
+    shift = 0.5 / e * (up - down) * h
+    for i in range(V.next.shape[1]):
+        V.next[k, i] += w[THIRD, i] * shift
+    return 0
+
+
+@jitable
+def project_end(V: Variations, scene: Scene, m: Method, t: float, k: int, e: float) -> int:
+    """Put the derivative at the end of the step along what holds; return a code."""
+    twin, w = view(V.words[TWIN], Scene), V.work
+    p = in_workspace(V.words[UP])[0]
+    for side in range(2):
+        sign = 1.0 if side == 0 else -1.0
+        set_parameter(V, twin, scene, k, sign * e)
+        out = w[UPPER] if side == 0 else w[LOWER]
+        for i in range(len(out)):
+            out[i] = m.trial[i] + sign * e * V.next[k, i]
+        code = call_int(p.project, (p.context, t, 0.0, out, out))
+        if code != 0:
+            return code
+    for i in range(V.next.shape[1]):
+        V.next[k, i] = 0.5 / e * (w[UPPER, i] - w[LOWER, i])
+    return 0
+
+
+@jitable
+def is_bent(V: Variations, scene: Scene) -> bool:
+    """Return whether a slot touched in some of the points of a step, and not in all."""
+    last = len(V.seen) - 1
+    for s in range(last):
+        if 0 < V.seen[s] < V.seen[last]:
+            return True
+    return False
+
+
+@jitable
+def step_along(
+    V: Variations, scene: Scene, m: Method, t: float, h: float, k: int, until: float
+) -> int:
+    """Carry the derivative in `next` over a part of the step, contact by contact; return a code."""
+    e = half_step(V, k)
+    begin = 0.0
+    for j in range(V.words[CHANGES]):
+        end = V.change[j, 1]
+        if end > until:
+            break
+        code = integrate(V, scene, t, h, k, begin, end, e)
+        if code == 0:
+            code = transfer(V, scene, t, h, k, j, e)
+        if code != 0:
+            return code
+        begin = max(begin, end)
+    return integrate(V, scene, t, h, k, begin, until, e)

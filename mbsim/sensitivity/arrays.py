@@ -1,0 +1,76 @@
+"""What sensitivities keep from step to step, beside a run's own arrays.
+
+The *twin* is a second packed `Scene`: what is committed it shares with the run, constants that
+parameters change and all scratch are its own. So it is evaluated beside the run and leaves it
+alone. P parameters, n numbers of y, ns slots.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from mbsim.core import tags
+from mbsim.core.arrays import F1, F2, F3, I1
+
+# numbers of `words`: the hooks of the run that are passed on to; tables of the run's method, of the
+# twin and of its two methods; addresses of an explicit method's functions, 0 for an implicit one;
+# how many numbers a law remembers
+COMMIT, OUTPUT, METHOD, TWIN, UP, DOWN, ATTEMPT, FIT_DENSE, REMEMBERED = range(9)
+# whether the last step has a polynomial; rows of results not taken yet; whether there are joints;
+# contacts that begin or end in the step; f of the twin; whether what changes is in order of time;
+# what touches on either side of a difference
+FITTED, ROWS, JOINTS, CHANGES, RHS, ORDERED, ALIKE = range(9, 16)
+# evaluations beside the run; derivatives of steps that were taken along the motion
+ASKED, BENT = 17, 18
+# whether points are on a straight line instead of on the step's polynomial
+STRAIGHT = 19
+WORDS = 20
+#: Rows of `Variations.jump`: y before the commit, f before and behind it.
+BEFORE, F_BEFORE, F_BEHIND = range(3)
+#: Contacts that may begin or end within one step.
+MOST_CHANGES = 16
+
+
+@tags.state
+class Variations(NamedTuple):
+    """Derivatives of y, and what they are made of."""
+
+    words: tags.Scratch[I1]  # (WORDS,) see the names above
+    d: F2  # (P, n) derivative of y at the committed point
+    memory: F3  # (P, ns, most) of what friction laws remember: `State.memory`
+    before: F3  # (P, ns, most) of `State.before`
+    lost: F1  # (P,) time from which a derivative is not known, inf while it is
+    why: I1  # (P,) for what reason: LOST_...
+    dense: F3  # (P, coefficients, n) of the last step, as `Method.dense`
+    next: tags.Scratch[F2]  # (P, n) derivative at the end of the step that is taken
+    far: tags.Scratch[F3]  # (2, ns, most) what laws make of their memory on either side
+    stage: tags.Scratch[F2]  # (STAGES, n) of an implicit method
+    path: tags.Scratch[F2]  # (coefficients, n) polynomial of the run's step
+    work: tags.Scratch[F2]  # (WORK, n) of `along`
+    error: tags.Scratch[F1]  # (P,) of the last step, over the derivative
+    enough: tags.Constant[F1]  # (1,) how large that may be
+    bends: tags.Scratch[I1]  # (P,) 1 where the last step was taken along the motion
+    jump: tags.Scratch[F2]  # (3, n) see BEFORE
+    late: tags.Scratch[F3]  # (P, ns, most) of what laws remember behind a change of branch
+    middle: tags.Scratch[F3]  # (P, ns, most) mean of both sides there
+    mode: tags.Scratch[F1]  # (ns,) `State.mode` before it
+    line: tags.Scratch[F1]  # (1,) length of the straight line [T]
+    shift: tags.Scratch[F1]  # (P,) by how much the end of the step is later, by the parameter
+    reason: tags.Scratch[F1]  # (P,) why a derivative is lost at the end of the step, or 0
+    seen: tags.Scratch[I1]  # (ns + 1,) in how many points of a step slots touched, of how many
+    kept: tags.Scratch[F2]  # (P, n) derivative at the begin of the last step
+    change: tags.Scratch[F2]  # (MOST_CHANGES, 2) slots that begin or end to touch, at which part
+    row: tags.Scratch[F2]  # (4, n) of a row of results: -, y beside it, its f, its derivative
+    scale: tags.Constant[F1]  # (n,) usual size of a number of y
+    room: tags.Constant[F1]  # (n,) by how much it may be changed for a difference
+    weights: tags.Constant[F1]  # of an explicit method's stages; none where joints hold bodies
+    size: tags.Constant[F1]  # (P,) of a parameter
+    first: tags.Constant[I1]  # (P + 1,) first of the numbers that a parameter changes
+    place: tags.Constant[I1]  # where each of these is
+    base: tags.Constant[F1]  # what it is
+    slope: tags.Constant[F1]  # its derivative
+    step: tags.Scratch[F2]  # (rows, P) by how much a parameter is changed for a row of results
+
+
+#: Why a derivative is not known from some time on.
+LOST_FAILED, LOST_JUMP, LOST_GRAZING, LOST_LARGE = range(1, 5)

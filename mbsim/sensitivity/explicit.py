@@ -1,0 +1,90 @@
+"""The derivative of a step of an explicit method: of what it computes, with its step held.
+
+That is the same method's step for the variational equations D' = f_y D + f_p.
+Source: H. G. Bock, in Modelling of Chemical Reaction Systems, Springer (1981) 102 (internal
+numerical differentiation).
+"""
+
+from __future__ import annotations
+
+from mbsim.arrays.scene import Scene
+from mbsim.core.address import call_int, view
+from mbsim.core.jitable import jitable
+from mbsim.integrators.scheme import SHOWN, Method, in_workspace
+from mbsim.sensitivity.arrays import (
+    ATTEMPT,
+    DOWN,
+    FIT_DENSE,
+    REMEMBERED,
+    TWIN,
+    UP,
+    Variations,
+)
+from mbsim.sensitivity.twin import beside, half_step, set_parameter
+
+
+@jitable
+def step_beside(
+    V: Variations, scene: Scene, m: Method, t: float, h: float, k: int, e: float, side: int
+) -> int:
+    """Take the run's step from the point moved by e along derivative k; return a code."""
+    twin, workspace = view(V.words[TWIN], Scene), V.words[UP + side]
+    p, own = in_workspace(workspace)
+    set_parameter(V, twin, scene, k, e)
+    beside(V, m.y, k, e, own.y)
+    own.memory[SHOWN] = 0.0
+    code = call_int(p.rhs, (p.context, t, 0.0, own.y, own.k[0]))
+    if code == 0:
+        code = call_int(V.words[ATTEMPT], (workspace, t, h, own.y, own.trial))
+    if code == 0 and V.words[REMEMBERED] > 0:
+        for s in range(V.far.shape[1]):
+            for j in range(V.far.shape[2]):
+                V.far[side, s, j] = twin.work.memory[s, j] if twin.work.touching[s] == 1 else 0.0
+    return code
+
+
+@jitable
+def explicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
+    """Fill derivative k at the end of the step that is taken, and its error; return a code."""
+    e = half_step(V, k)
+    for side in range(2):
+        code = step_beside(V, scene, m, t, h, k, e if side == 0 else -e, side)
+        if code != 0:
+            return code
+    up, down = in_workspace(V.words[UP])[1], in_workspace(V.words[DOWN])[1]
+    part, error, whole = 0.5 / e, 0.0, 1.0 / V.size[k]
+    for i in range(len(m.y)):
+        if len(V.weights) > 0:
+            # what is rounded is the change alone
+            rise = 0.0
+            for j in range(len(V.weights)):
+                rise += V.weights[j] * (up.k[j, i] - down.k[j, i])
+            V.next[k, i] = V.d[k, i] + h * part * rise
+        else:
+            V.next[k, i] = part * (up.trial[i] - down.trial[i])
+        error = max(error, part * abs(up.error[i] - down.error[i]) / V.scale[i])
+        whole = max(whole, abs(V.next[k, i]) / V.scale[i], abs(V.d[k, i]) / V.scale[i])
+    V.error[k] = error / whole
+    if V.words[REMEMBERED] > 0:
+        for s in range(V.far.shape[1]):
+            for j in range(V.far.shape[2]):
+                V.far[0, s, j] = part * (V.far[0, s, j] - V.far[1, s, j])
+    return 0
+
+
+@jitable
+def fit_beside(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
+    """Fill the polynomials of the run's step, and of its derivative k; return a code."""
+    twin, e = view(V.words[TWIN], Scene), half_step(V, k)
+    for side in range(2):
+        set_parameter(V, twin, scene, k, e if side == 0 else -e)
+        own = in_workspace(V.words[UP + side])[1]
+        code = call_int(V.words[FIT_DENSE], (V.words[UP + side], t, h, own.y, own.trial))
+        if code != 0:
+            return code
+    up, down = in_workspace(V.words[UP])[1], in_workspace(V.words[DOWN])[1]
+    for j in range(V.dense.shape[1]):
+        for i in range(len(m.y)):
+            V.dense[k, j, i] = 0.5 / e * (up.dense[j, i] - down.dense[j, i])
+            V.path[j, i] = 0.5 * (up.dense[j, i] + down.dense[j, i])
+    return 0

@@ -1,0 +1,261 @@
+"""The run's `commit` and `output`, which carry derivatives along.
+
+Both are hooks of the run's problem in the place of its own, which they pass on to: a run without
+sensitivities has nothing of this.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.codes import NOW, WITHIN
+from mbsim.arrays.hooks import Hook
+from mbsim.arrays.scene import Scene
+from mbsim.core.address import call_int, vector_at, view
+from mbsim.core.arrays import F1, Pointer
+from mbsim.core.codes import Code
+from mbsim.core.jitable import jitable
+from mbsim.core.problem import Problem, Taken
+from mbsim.integrators.scheme import (
+    LAST_STEP,
+    LAST_TIME,
+    OWN_TIME,
+    SHOWN,
+    SWITCHED,
+    TIME,
+    Method,
+    in_workspace,
+)
+from mbsim.sensitivity.along import is_bent, list_changes, order_changes, project_end, step_along
+from mbsim.sensitivity.arrays import (
+    ASKED,
+    ATTEMPT,
+    BEFORE,
+    BENT,
+    CHANGES,
+    COMMIT,
+    F_BEFORE,
+    FITTED,
+    JOINTS,
+    LOST_FAILED,
+    LOST_LARGE,
+    METHOD,
+    ORDERED,
+    OUTPUT,
+    REMEMBERED,
+    RHS,
+    ROWS,
+    STRAIGHT,
+    TWIN,
+    UP,
+    Variations,
+)
+from mbsim.sensitivity.events import SPAN, cross, note_memory, note_shift
+from mbsim.sensitivity.explicit import explicit_step, fit_beside
+from mbsim.sensitivity.implicit import implicit_step
+from mbsim.sensitivity.twin import half_step, set_parameter
+
+#: Where the packed `Variations` stand: where those of MOREAU would, which takes no part in this.
+AT = Hook.STEPPING
+#: A parameter that moves bodies by their usual sizes when it changes by 1e-9 of itself moves them
+#: by chance.
+LARGEST = 1e9
+
+
+@jitable
+def lose(V: Variations, k: int, t: float, why: int) -> None:
+    """Know derivative k no more from time t on."""
+    if V.lost[k] == math.inf:
+        V.lost[k] = t
+        V.why[k] = why
+
+
+@jitable
+def fit(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
+    """Fill the polynomials of the run's step, and of derivative k of an explicit one."""
+    if V.words[ATTEMPT] != 0:
+        return fit_beside(V, scene, m, t, h, k)
+    for i in range(len(m.y)):
+        V.path[0, i] = m.y[i]
+        for j in range(3):
+            V.path[1 + j, i] = m.ahead[j, i]
+    return 0
+
+
+@jitable
+def carry(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
+    """Fill derivative k at the end of the step that is taken; return a code."""
+    for s in range(len(V.seen)):
+        V.seen[s] = 0
+    if V.words[ATTEMPT] == 0:
+        code = implicit_step(V, scene, m, t, h, k)
+    else:
+        code = explicit_step(V, scene, m, t, h, k)
+    if code != 0:
+        return code
+    bends = V.words[CHANGES] > 0 or is_bent(V, scene) or V.error[k] > V.enough[0]
+    V.bends[k] = 1 if bends else 0
+    V.words[BENT] += V.bends[k]
+    if bends or (m.memory[SHOWN] == 1.0 and V.words[ATTEMPT] != 0):
+        code = fit(V, scene, m, t, h, k)
+    if code != 0 or not bends:
+        return code
+    if V.words[ORDERED] == 0:
+        V.words[ORDERED] = 1
+        if not order_changes(V, scene, t, h):
+            return Code.NOT_CONVERGED
+    for i in range(len(m.y)):
+        V.next[k, i] = V.d[k, i]
+    code = step_along(V, scene, m, t, h, k, 1.0)
+    if code == 0 and V.words[JOINTS] == 1:
+        code = project_end(V, scene, m, t + h, k, half_step(V, k))
+    return code
+
+
+@jitable
+def take_step(V: Variations, scene: Scene, m: Method, t: float, h: float) -> None:
+    """Carry all derivatives over the step from t that is taken."""
+    twin = view(V.words[TWIN], Scene)
+    V.words[CHANGES] = V.words[ORDERED] = 0
+    listed = len(scene.contacts.id) == 0 or list_changes(V, scene, t, h)
+    V.words[FITTED] = 1 if m.memory[SHOWN] == 1.0 or V.words[ATTEMPT] == 0 else 0
+    for k in range(len(V.size)):
+        if V.lost[k] < math.inf:
+            continue
+        if not listed or carry(V, scene, m, t, h, k) != 0:
+            lose(V, k, t, LOST_FAILED)
+        elif V.words[REMEMBERED] > 0:
+            for s in range(V.memory.shape[1]):
+                for j in range(V.memory.shape[2]):
+                    V.before[k, s, j] = V.memory[k, s, j]
+                    V.memory[k, s, j] = V.far[0, s, j]
+        set_parameter(V, twin, scene, k, 0.0)
+
+
+def rhs_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
+    """F of the twin, and which slots touch there."""
+    twin = view(context, Scene)
+    V = view(twin.world.hooks[AT], Variations)
+    code = call_int(V.words[RHS], (context, t, h, a, b))
+    V.words[ASKED] += 1
+    hit, last = twin.work.hit, len(twin.work.hit) - 1
+    for j in range(hit[last]):
+        V.seen[hit[j]] += 1
+    V.seen[last] += 1
+    return code
+
+
+def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
+    """What follows from a step that is taken, and its derivatives."""
+    scene = view(context, Scene)
+    V = view(scene.world.hooks[AT], Variations)
+    p, m = in_workspace(V.words[METHOD])
+    if h == 0.0:
+        return call_int(V.words[COMMIT], (context, t, h, a, b))
+    n = len(m.y)
+    y, f = vector_at(a, n), vector_at(b, n)
+    take_step(V, scene, m, t - h, h)
+    switched = p.switching != 0 and m.memory[SWITCHED] > 0.0
+    for i in range(n):
+        V.jump[BEFORE, i], V.jump[F_BEFORE, i] = y[i], f[i]
+    if switched:
+        note_changes(V, scene, m, t)
+    word = call_int(V.words[COMMIT], (context, t, h, a, b))
+    if word >= 0 and (switched or word & (Taken.Y_CHANGED + Taken.BEGIN_ANEW)):
+        for k in range(len(V.size)):
+            V.reason[k] = 0.0
+        cross(V, scene, t, y, switched, V.reason)
+        for k in range(len(V.size)):
+            if V.reason[k] != 0.0:
+                lose(V, k, t, int(V.reason[k]))
+    for k in range(len(V.size)):
+        for i in range(n):
+            V.kept[k, i] = V.d[k, i]
+            V.d[k, i] = V.next[k, i]
+            if not abs(V.d[k, i]) * V.size[k] <= LARGEST * V.scale[i]:
+                lose(V, k, t, LOST_LARGE)
+    return word
+
+
+@jitable
+def note_changes(V: Variations, scene: Scene, m: Method, t: float) -> None:
+    """Find how the end of a step at which a branch changes moves with every parameter."""
+    # of a very short step, as many end at a branch, the polynomial is all rounding
+    H = V.line[0] = SPAN * m.memory[OWN_TIME]
+    V.words[STRAIGHT] = 1
+    for k in range(len(V.size)):
+        if V.lost[k] == math.inf:
+            note_shift(V, scene, t, H, k)
+            if V.words[REMEMBERED] > 0 and abs(V.shift[k]) < math.inf:
+                note_memory(V, scene, t, H, k)
+    V.words[STRAIGHT] = 0
+
+
+@jitable
+def derivative_at(V: Variations, scene: Scene, m: Method, k: int, t: float, out: F1) -> int:
+    """Write derivative k at a time within the last step, or at its end; return a code."""
+    h, n = m.memory[LAST_STEP], len(out)
+    if t >= m.memory[TIME] or h == 0.0 or V.words[FITTED] == 0:
+        for i in range(n):
+            out[i] = V.d[k, i]
+        return 0
+    s, code = min(1.0, (t - m.memory[LAST_TIME]) / h), 0
+    if V.bends[k] == 1:
+        twin = view(V.words[TWIN], Scene)
+        twin.world.past[0] = WITHIN
+        for i in range(n):
+            V.next[k, i] = V.kept[k, i]
+        code = step_along(V, scene, m, m.memory[LAST_TIME], h, k, s)
+        twin.world.past[0] = NOW
+        for i in range(n):
+            out[i] = V.next[k, i]
+        return code
+    d, r = V.dense[k], 1.0 - s
+    last = len(d) - 1
+    for i in range(n):
+        value = d[last, i]
+        for j in range(last - 1, -1, -1):
+            value = d[j, i] + (s if j % 2 == 0 else r) * value
+        out[i] = value
+    return code
+
+
+@jitable
+def write_beside(
+    V: Variations, scene: Scene, p: Problem, m: Method, t: float, h: float, k: int, y: Pointer
+) -> None:
+    """Write rows of results on either side for parameter k."""
+    twin, x, n = view(V.words[TWIN], Scene), V.row[1], len(m.y)
+    at = vector_at(y, n)
+    e = half_step(V, k)
+    V.step[V.words[ROWS], k] = e
+    w = V.row[3]
+    if derivative_at(V, scene, m, k, t, w) != 0:
+        lose(V, k, t, LOST_FAILED)
+    for side in range(2):
+        sign = 1.0 if side == 0 else -1.0
+        set_parameter(V, twin, scene, k, sign * e)
+        for i in range(n):
+            x[i] = at[i] + sign * e * w[i]
+        code = call_int(p.project, (p.context, t, 0.0, x, x))
+        answer = call_int(V.words[OUTPUT], (p.context, t, h, x, V.row[2]))
+        if code != 0 or answer < 0:
+            lose(V, k, t, LOST_FAILED)
+            # the row is there all the same, so that rows are told by their number
+            if answer < 0:
+                twin.rows.used[0] += 1
+    if V.lost[k] <= t:
+        V.step[V.words[ROWS], k] = math.nan
+    set_parameter(V, twin, scene, k, 0.0)
+
+
+def output_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
+    """A row of results, and those beside it."""
+    scene = view(context, Scene)
+    V = view(scene.world.hooks[AT], Variations)
+    m = in_workspace(V.words[METHOD])[1]
+    p = in_workspace(V.words[UP])[0]
+    for k in range(len(V.size)):
+        write_beside(V, scene, p, m, t, h, k, a)
+    V.words[ROWS] += 1
+    return call_int(V.words[OUTPUT], (context, t, h, a, b))

@@ -1,0 +1,225 @@
+"""The derivative of a step of RADAU5: the stages' equations linearised, by the step's own factors.
+
+The stages D + z_j of a derivative obey z = h A F, F_j = f_y (D + z_j) + f_p at stage j (staggered
+direct method). F is a difference of the equations; the iteration with the linearisation of the
+step, which need not be exact, ends where it changes nothing any more.
+Source: T. Maly, L. R. Petzold, Appl. Numer. Math. 20 (1996) 57; E. Hairer, G. Wanner, Solving ODEs
+II (1996), section IV.8.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.scene import Scene
+from mbsim.core.address import call_int, view
+from mbsim.core.codes import Code
+from mbsim.core.jitable import jitable
+from mbsim.core.problem import Problem
+from mbsim.integrators.positions import put_along
+from mbsim.integrators.radau5 import G0, G_IM, G_RE, TI, C, T
+from mbsim.integrators.radau5 import E as ERROR
+from mbsim.integrators.radau5 import Z as STAGES_AT
+from mbsim.integrators.scheme import FRESH, LAST_STEP, Method, in_workspace
+from mbsim.sensitivity.arrays import JOINTS, REMEMBERED, TWIN, UP, Variations
+from mbsim.sensitivity.twin import half_step, set_parameter
+
+#: Rows of `Variations.stage`: stages less D, F, the right-hand sides and solutions of both systems,
+#: a point and f there.
+Z, F, REAL, REAL_D, PAIR, PAIR_D, POINT, SLOPE = 0, 3, 6, 7, 8, 10, 12, 13
+STAGES = 14
+#: By how much the error of order 3 overrates that of the step.
+OVERRATED = 100.0
+#: The iteration ends at a correction of this part of the derivative, or after so many, or where
+#: they get no smaller, which is rounding where they are below the third number.
+ENOUGH, MOST, ROUNDING = 1e-10, 12, 1e-5
+
+
+@jitable
+def extrapolate(V: Variations, m: Method, h: float, k: int) -> None:
+    """Begin with stages where the last step's polynomial, carried on, has them."""
+    z, d = V.stage[Z : Z + 3], V.dense[k]
+    known = m.memory[FRESH] == 0.0 and m.memory[LAST_STEP] > 0.0 and h < 10.0 * m.memory[LAST_STEP]
+    for j in range(3):
+        s = 1.0 + C[j] * h / m.memory[LAST_STEP] if known else 0.0
+        for i in range(len(m.y)):
+            inner = d[2, i] + s * d[3, i]
+            z[j, i] = s * (d[1, i] + (1.0 - s) * inner) - d[1, i] if known else 0.0
+
+
+@jitable
+def point_beside(V: Variations, m: Method, k: int, j: int, e: float) -> None:
+    """Write stage j moved by e along its derivative."""
+    x, z = V.stage[POINT], V.stage[Z + j]
+    for i in range(len(m.y)):
+        x[i] = m.y[i] + m.k[STAGES_AT + j, i] + e * (V.d[k, i] + z[i])
+
+
+@jitable
+def evaluate_stages(
+    V: Variations, scene: Scene, m: Method, t: float, h: float, k: int, e: float
+) -> int:
+    """Fill F at all stages; return a code."""
+    twin = view(V.words[TWIN], Scene)
+    p = in_workspace(V.words[UP])[0]
+    part = 0.5 / e
+    for side in range(2):
+        sign = 1.0 if side == 0 else -1.0
+        set_parameter(V, twin, scene, k, sign * e)
+        for j in range(3):
+            point_beside(V, m, k, j, sign * e)
+            f = V.stage[SLOPE]
+            code = call_int(p.rhs, (p.context, t + C[j] * h, C[j] * h, V.stage[POINT], f))
+            if code != 0:
+                return code
+            for i in range(len(m.y)):
+                V.stage[F + j, i] = part * f[i] if side == 0 else V.stage[F + j, i] - part * f[i]
+        if V.words[REMEMBERED] > 0:
+            for s in range(V.far.shape[1]):
+                for q in range(V.far.shape[2]):
+                    touches = twin.work.touching[s] == 1
+                    V.far[side, s, q] = twin.work.memory[s, q] if touches else 0.0
+    return 0
+
+
+@jitable
+def correct(
+    V: Variations, p: Problem, m: Method, t: float, h: float, k: int
+) -> tuple[int, float, float]:
+    """Correct the stages once; return a code, the correction's size and that of the stages."""
+    n, z, f = len(m.y), V.stage[Z : Z + 3], V.stage[F : F + 3]
+    g, re, im = G0 / h, G_RE / h, G_IM / h
+    real, pair = V.stage[REAL], V.stage[PAIR : PAIR + 2]
+    d, dd = V.stage[REAL_D], V.stage[PAIR_D : PAIR_D + 2]
+    for i in range(n):
+        f0, f1, f2 = f[0, i], f[1, i], f[2, i]
+        w0 = TI[0, 0] * z[0, i] + TI[0, 1] * z[1, i] + TI[0, 2] * z[2, i]
+        w1 = TI[1, 0] * z[0, i] + TI[1, 1] * z[1, i] + TI[1, 2] * z[2, i]
+        w2 = TI[2, 0] * z[0, i] + TI[2, 1] * z[1, i] + TI[2, 2] * z[2, i]
+        real[i] = TI[0, 0] * f0 + TI[0, 1] * f1 + TI[0, 2] * f2 - g * w0
+        pair[0, i] = TI[1, 0] * f0 + TI[1, 1] * f1 + TI[1, 2] * f2 - (re * w1 - im * w2)
+        pair[1, i] = TI[2, 0] * f0 + TI[2, 1] * f1 + TI[2, 2] * f2 - (re * w2 + im * w1)
+    if V.words[JOINTS] == 1:
+        for r in (real, pair[0], pair[1]):
+            put_along(p, m, t, m.y, r, V.stage[POINT])
+    code = call_int(p.solve, (p.context, t, h, real, d))
+    if code == 0:
+        code = call_int(p.solve_pair, (p.context, t, h, pair, dd))
+    size, whole = 0.0, 1.0 / V.size[k]
+    for j in range(3):
+        for i in range(n):
+            step = T[j, 0] * d[i] + T[j, 1] * dd[0, i] + T[j, 2] * dd[1, i]
+            z[j, i] += step
+            size = max(size, abs(step) / V.scale[i])
+            whole = max(whole, abs(V.d[k, i] + z[j, i]) / V.scale[i])
+    return code, size, whole
+
+
+@jitable
+def project_stages(
+    V: Variations, scene: Scene, m: Method, t: float, h: float, k: int, e: float
+) -> int:
+    """Put the derivatives of all stages along what holds; return a code."""
+    twin, n = view(V.words[TWIN], Scene), len(m.y)
+    p = in_workspace(V.words[UP])[0]
+    part, x = 0.5 / e, V.stage[POINT]
+    for side in range(2):
+        sign = 1.0 if side == 0 else -1.0
+        set_parameter(V, twin, scene, k, sign * e)
+        for j in range(3):
+            point_beside(V, m, k, j, sign * e)
+            code = call_int(p.project, (p.context, t + C[j] * h, C[j] * h, x, x))
+            if code != 0:
+                return code
+            moved = V.stage[F + j]
+            for i in range(n):
+                moved[i] = part * x[i] if side == 0 else moved[i] - part * x[i]
+    for j in range(3):
+        for i in range(n):
+            V.stage[Z + j, i] = V.stage[F + j, i] - V.d[k, i]
+    return 0
+
+
+@jitable
+def implicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
+    """Fill derivative k at the end of the step that is taken; return a code."""
+    own = in_workspace(V.words[UP])[0]
+    e = half_step(V, k)
+    extrapolate(V, m, h, k)
+    before = math.inf
+    for iteration in range(MOST):
+        code = evaluate_stages(V, scene, m, t, h, k, e)
+        if code != 0:
+            return code
+        code, size, whole = correct(V, own, m, t, h, k)
+        if code == 0 and V.words[JOINTS] == 1:
+            code = project_stages(V, scene, m, t, h, k, e)
+        if code != 0:
+            return code
+        if not size < math.inf:
+            return Code.NOT_CONVERGED
+        if size <= ENOUGH * whole or (size >= 0.5 * before and size <= ROUNDING * whole):
+            break
+        if iteration + 1 == MOST and size > ROUNDING * whole:
+            return Code.NOT_CONVERGED
+        before = size
+    keep_polynomial(V, m, k)
+    code = estimate_error(V, scene, m, t, h, k, e)
+    if code != 0:
+        return code
+    if V.words[REMEMBERED] > 0:
+        for s in range(V.far.shape[1]):
+            for j in range(V.far.shape[2]):
+                V.far[0, s, j] = 0.5 / e * (V.far[0, s, j] - V.far[1, s, j])
+    return 0
+
+
+@jitable
+def estimate_error(
+    V: Variations, scene: Scene, m: Method, t: float, h: float, k: int, e: float
+) -> int:
+    """Leave the filtered error of the step of a derivative, over that; return a code.
+
+    It is the method's own, of order 3: far larger than what the step is off by.
+    """
+    p, twin = in_workspace(V.words[UP])[0], view(V.words[TWIN], Scene)
+    r, x, f = V.stage[REAL], V.stage[POINT], V.stage[SLOPE]
+    for i in range(len(m.y)):
+        r[i] = 0.0
+        for j in range(3):
+            r[i] += ERROR[j] * V.stage[Z + j, i] / h
+    for side in range(2):
+        sign = 1.0 if side == 0 else -1.0
+        set_parameter(V, twin, scene, k, sign * e)
+        for i in range(len(m.y)):
+            x[i] = m.y[i] + sign * e * V.d[k, i]
+        code = call_int(p.rhs, (p.context, t, 0.0, x, f))
+        if code != 0:
+            return code
+        for i in range(len(m.y)):
+            r[i] += sign * 0.5 / e * f[i]
+    if V.words[JOINTS] == 1:
+        put_along(p, m, t, m.y, r, x)
+    code = call_int(p.solve, (p.context, t, h, r, V.stage[REAL_D]))
+    error, whole = 0.0, 1.0 / V.size[k]
+    for i in range(len(m.y)):
+        error = max(error, abs(V.stage[REAL_D, i]) / V.scale[i])
+        whole = max(whole, abs(V.next[k, i]) / V.scale[i], abs(V.d[k, i]) / V.scale[i])
+    V.error[k] = error / whole / OVERRATED
+    return code
+
+
+@jitable
+def keep_polynomial(V: Variations, m: Method, k: int) -> None:
+    """Leave the end of the step, and the polynomial through its stages."""
+    c0, c1, z = C[0], C[1], V.stage
+    for i in range(len(m.y)):
+        rise = z[Z + 2, i]
+        first = (z[Z, i] / c0 - rise) / (1.0 - c0)
+        second = (z[Z + 1, i] / c1 - rise) / (1.0 - c1)
+        bend = (second - first) / (c1 - c0)
+        V.dense[k, 0, i] = V.d[k, i]
+        V.dense[k, 1, i] = rise
+        V.dense[k, 2, i] = first - c0 * bend
+        V.dense[k, 3, i] = bend
+        V.next[k, i] = V.d[k, i] + rise

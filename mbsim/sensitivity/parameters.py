@@ -1,0 +1,182 @@
+"""Parameters of a deck as directions in a run's arrays: which numbers they change, and how fast.
+
+The deck is read and built a few times with the parameter a little changed, and what differs is
+what it changes: whatever attribute it is, no list of them is kept anywhere.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbsim.core import tags
+from mbsim.errors import MbsimError, ModelError
+
+if TYPE_CHECKING:
+    from mbsim.compile_model.build import System
+
+Array = np.ndarray[Any, Any]
+#: Builds are made at so many parts of a parameter's size to either side; differences of order 4.
+_CHANGE = 1e-3
+_PARTS = (1.0, -1.0, 0.5, -0.5)
+#: By what errors are judged, what bounds steps and what is only room: it does not move anything.
+_ASIDES = (
+    "world/scale", "world/hooks", "scales/", "audit/", "states/scale", "residuals/scale",
+    "applied/bound", "sensors/", "programs/quick",
+)  # fmt: skip
+#: Numbers that differ by less, over their size, differ by rounding.
+_ROUNDING = 1e-13
+#: Scratch that nothing fills but the build: shapes that stand still.
+_FILLED_ONCE = "work/frames"
+
+
+@dataclass(frozen=True)
+class Direction:
+    """How a parameter changes a run.
+
+    Attributes
+    ----------
+    name : str
+        As of ``--set``.
+    value, size : float
+        Of the parameter; its usual size, which is 1 where it is 0.
+    arrays : dict
+        Derivatives of the arrays that it changes, by path in `Scene`.
+    systems : tuple of System
+        Built with the parameter at value + change * part of `PARTS`.
+    change : float
+    """
+
+    name: str
+    value: float
+    size: float
+    arrays: dict[str, Array]
+    systems: tuple[System, ...]
+    change: float
+
+
+def weighed(found: list[Array], change: float) -> Array:
+    """Return the derivative of what was found at the four changed values."""
+    whole = (found[0] - found[1]) / (2.0 * change)
+    half = (found[2] - found[3]) / change
+    slope: Array = (4.0 * half - whole) / 3.0
+    return slope
+
+
+def value_in(name: str, text: str | None) -> float:
+    """Return the number that an attribute of the deck is.
+
+    Raises
+    ------
+    ModelError
+        If it is none.
+    """
+    if text is None:
+        raise ModelError(
+            f"sensitivity: {name} is not given in the deck; give its value there, or by --set"
+        )
+    try:
+        value = float(text.replace("D", "E").replace("d", "e"))
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ModelError(
+            f"sensitivity: {name}={text} is no number; let it look at a Reference_Variable, whose "
+            "expression is one"
+        )
+    return value
+
+
+def direction(
+    name: str, value: float, build: Callable[[str, float], System], base: System
+) -> Direction:
+    """Return how a parameter changes a run.
+
+    Parameters
+    ----------
+    name : str
+    value : float
+    build : callable
+        Returns the system with the parameter at another value.
+    base : System
+        That of the run.
+
+    Raises
+    ------
+    ModelError
+        If the deck is none with the parameter a little changed, or it changes what is there.
+    """
+    size = abs(value) or 1.0
+    change = _CHANGE * size
+    try:
+        systems = tuple(build(name, value + part * change) for part in _PARTS)
+    except MbsimError as error:
+        raise ModelError(
+            f"sensitivity: {name} cannot be changed to either side of {value:.9g}: {error}"
+        ) from None
+    tables = [_tables(system) for system in systems]
+    names = {key for table in tables for key in table} | set(_tables(base))
+    arrays: dict[str, Array] = {}
+    for key in sorted(names):
+        found = [table.get(key) for table in tables]
+        if key.startswith(_ASIDES):
+            continue
+        there = [each for each in found if each is not None]
+        if len({each.shape for each in there}) != 1 or len(there) != len(found):
+            raise ModelError(f"sensitivity: {name} changes what the model is made of: {key}")
+        if there[0].dtype.kind == "i":
+            if any(not np.array_equal(there[0], each) for each in there[1:]):
+                raise ModelError(f"sensitivity: {name} changes what the model is made of: {key}")
+            continue
+        if all(np.array_equal(there[0], each, equal_nan=True) for each in there[1:]):
+            continue
+        with np.errstate(invalid="ignore"):
+            slope = weighed(there, change)
+        level = _ROUNDING / _CHANGE * np.maximum(np.abs(there[0]), np.abs(there[1])) / size
+        slope = np.where(np.isfinite(slope) & (np.abs(slope) > level), slope, 0.0)
+        if slope.any():
+            arrays[key] = slope
+    return Direction(name, value, size, arrays, systems, change)
+
+
+def _tables(system: System) -> dict[str, Array]:
+    """Return the arrays that a parameter may change, by path."""
+    found = dict(tags.arrays(system.scene, tags.CONSTANT))
+    fixed = system.scene.graphics.body == len(system.body_ids)
+    found[_FILLED_ONCE] = np.where(fixed[:, None], system.scene.work.frames, 0.0)
+    return found
+
+
+def replaced(whole: Any, made: Mapping[str, Array], path: str = "") -> Any:
+    """Return a group of groups with other arrays, by path."""
+    fields = {}
+    for name in whole._fields:
+        value, at = getattr(whole, name), f"{path}{name}"
+        if isinstance(value, tuple):
+            fields[name] = replaced(value, made, f"{at}/")
+        elif at in made:
+            fields[name] = made[at]
+    return whole._replace(**fields)
+
+
+def refused(system: System, settings: Any) -> str | None:
+    """Return why sensitivities are not for a run, None where they are."""
+    model = system.model
+    if settings.integrator not in ("AUTO", "DOPRI5", "DOP853", "RADAU5"):
+        return f"integrator {settings.integrator} has none; take AUTO, DOPRI5, DOP853 or RADAU5"
+    if system.needs_fcl:
+        return "FCL finds contacts of this model, whose normals scatter by 2e-6"
+    stages = [stage.simulation for stage in settings.stages]
+    if any(stage.analysis_type == "STATIC" for stage in stages):
+        return "a static equilibrium in <Command> is not built"
+    if any(stage.changes or stage.inactive for stage in stages):
+        return "changes of elements in <Command> are not built"
+    if model.sensors:
+        return "Sensor_Event is not built"
+    if system.reader is not None:
+        return "subroutines that look at the model by py_sysfnc are not built"
+    return None

@@ -1,0 +1,338 @@
+"""`Sensitivities`: made for a run, its rows taken beside the run's, and what came of them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.hooks import Hook
+from mbsim.core import jit, tags
+from mbsim.core.address import pack
+from mbsim.core.problem import HOOK, VELOCITY
+from mbsim.dynamics.bodies import configuration
+from mbsim.integrators import scheme
+from mbsim.results.blocks import Block, Gathered
+from mbsim.results.signal_filter import SignalFilter
+from mbsim.results.signals import signals
+from mbsim.sensitivity import arrays as at
+from mbsim.sensitivity.along import WORK
+from mbsim.sensitivity.arrays import Variations
+from mbsim.sensitivity.hooks import AT, commit_hook, output_hook, rhs_hook
+from mbsim.sensitivity.implicit import STAGES
+from mbsim.sensitivity.parameters import Direction, replaced, weighed
+from mbsim.sensitivity.twin import STEP, STEP_OF_CONTACTS
+
+if TYPE_CHECKING:
+    from mbsim.compile_model.build import System
+    from mbsim.core.problem import Problem
+
+Array = np.ndarray[Any, Any]
+#: State that counts and judges: the twin's own, so that it leaves the run's alone.
+_OWN_STATE = ("log/", "audit/", "rows/", "state/memory", "state/before", "state/chattering")
+#: The error of a step of a derivative may be this part of it, or so many tol.
+ENOUGH, ENOUGH_TOL = 1e-9, 10.0
+#: What is no signal of the motion.
+_NO_SIGNALS = ("time", "state/", "contact_points/", "events")
+_WHY = {
+    at.LOST_FAILED: "the equations beside the run could not be evaluated or solved",
+    at.LOST_JUMP: "forces jump, or what friction keeps; how the time of that moves is unknown",
+    at.LOST_GRAZING: "an event is met with next to no speed: its time has no derivative",
+    at.LOST_LARGE: "it has grown beyond all bounds: the motion is chaotic",
+}
+
+
+def twin_of(system: System, directions: Sequence[Direction]) -> System:
+    """Return a system of the run's arrays, with constants that change and scratch of its own."""
+    scene, own = system.scene, {}
+    changed = {name for direction in directions for name in direction.arrays}
+    for name, array in tags.arrays(scene, tags.CONSTANT):
+        if name in changed:
+            own[name] = array.copy()
+    for name, array in tags.arrays(scene, tags.SCRATCH):
+        own[name] = array.copy()
+    for name, array in tags.arrays(scene, tags.STATE):
+        if name.startswith(_OWN_STATE):
+            own[name] = array.copy()
+    rows = 2 * len(directions)
+    for name, array in tags.arrays(scene.rows, tags.SCRATCH, "rows/"):
+        own[name] = np.zeros((rows * len(array), *array.shape[1:]), array.dtype)
+    return dataclasses.replace(system, scene=replaced(scene, own))
+
+
+class Sensitivities:
+    """Derivatives of a run with respect to parameters.
+
+    Parameters
+    ----------
+    system : System
+        Of the run, as it stands at its start.
+    directions : sequence of Direction
+    assemble : callable
+        Puts the bodies of a point of a system where constraints hold: the twin's, then the point.
+    tol : float
+        Of the run.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        directions: Sequence[Direction],
+        y: Array,
+        assemble: Callable[[System, System, Any, Array], None],
+        problem: Problem,
+        tol: float,
+    ) -> None:
+        self.system, self.directions = system, list(directions)
+        self.twin = twin_of(system, directions)
+        self._table = pack(self.twin.scene)
+        self.gathered = Gathered(self.twin)
+        self._steps: list[Array] = []
+        own = problem._replace(context=int(self._table.ctypes.data))
+        starts = [self._start(direction, assemble, own) for direction in self.directions]
+        self.arrays = self._arrays(y, np.array(starts), tol)
+        self._pack()
+        self._alive: Any = None
+        self._mark: Any = None
+
+    def _start(self, direction: Direction, assemble: Any, problem: Problem) -> Array:
+        """Return the derivative of y at the start."""
+        scene, found = self.twin.scene, []
+        state = tags.copies(scene, tags.STATE)
+        own = {name: array.copy() for name, array in _by_path(scene) if name in direction.arrays}
+        for system in direction.systems:
+            changed = dict(_by_path(system.scene))
+            for name, array in _by_path(scene):
+                if name in direction.arrays:
+                    array[...] = changed[name]
+            y = system.y0.copy()
+            assemble(self.twin, system, problem, y)
+            found.append(y)
+        for name, array in _by_path(scene):
+            if name in own:
+                array[...] = own[name]
+        tags.put_back(scene, tags.STATE, state)
+        return weighed(found, direction.change)
+
+    def _arrays(self, y: Array, start: Array, tol: float) -> Variations:
+        """Return what is kept from step to step."""
+        scene, n, count = self.system.scene, len(y), len(self.directions)
+        shape = scene.state.memory.shape
+        place, base, slope, first = [], [], [], [0]
+        by_path = dict(_by_path(self.twin.scene))
+        for direction in self.directions:
+            for name, table in direction.arrays.items():
+                own = by_path[name]
+                for k in np.flatnonzero(table):
+                    place.append(own.ctypes.data + 8 * int(k))
+                    base.append(float(own.ravel()[k]))
+                    slope.append(float(table.ravel()[k]))
+            first.append(len(place))
+        rows = len(scene.rows.time)
+        return Variations(
+            words=np.zeros(at.WORDS, dtype=np.int64),
+            d=start.reshape(count, n).copy(),
+            memory=np.zeros((count, *shape)),
+            before=np.zeros((count, *shape)),
+            lost=np.full(count, math.inf),
+            why=np.zeros(count, dtype=np.int64),
+            dense=np.zeros((count, 0, n)),
+            next=np.zeros((count, n)),
+            far=np.zeros((2, *shape)),
+            stage=np.zeros((STAGES, n)),
+            path=np.zeros((0, n)),
+            work=np.zeros((WORK, n)),
+            error=np.zeros(count),
+            enough=np.full(1, max(ENOUGH, ENOUGH_TOL * tol)),
+            bends=np.zeros(count, dtype=np.int64),
+            jump=np.zeros((3, n)),
+            late=np.zeros((count, *shape)),
+            middle=np.zeros((count, *shape)),
+            mode=np.zeros(shape[0]),
+            line=np.zeros(1),
+            shift=np.zeros(count),
+            reason=np.zeros(count),
+            seen=np.zeros(len(scene.state.touching) + 1, dtype=np.int64),
+            kept=np.zeros((count, n)),
+            change=np.zeros((at.MOST_CHANGES, 2)),
+            row=np.zeros((4, n)),
+            scale=_scale(self.system, n),
+            room=_scale(self.system, n) * _steps(self.system, n),
+            weights=np.zeros(0),
+            size=np.array([direction.size for direction in self.directions]),
+            first=np.array(first, dtype=np.int64),
+            place=np.array(place, dtype=np.int64),
+            base=np.array(base),
+            slope=np.array(slope),
+            step=np.zeros((rows, count)),
+        )
+
+    def hooked(self, problem: Problem) -> Problem:
+        """Return the run's problem with the hooks that carry derivatives along."""
+        words = self.arrays.words
+        commit, output = (jit.address(f, HOOK) for f in (commit_hook, output_hook))
+        if problem.commit != commit:
+            words[at.COMMIT], words[at.OUTPUT] = problem.commit, problem.output
+        return problem._replace(commit=commit, output=output)
+
+    def bind(self, running: scheme.Scheme, problem: Problem, workspace: Any) -> None:
+        """Go on with the method that runs; `workspace` is the table of its own."""
+        words, n = self.arrays.words, self.arrays.d.shape[1]
+        own = problem._replace(
+            context=int(self._table.ctypes.data),
+            commit=int(words[at.COMMIT]),
+            output=int(words[at.OUTPUT]),
+        )
+        words[at.RHS] = problem.rhs
+        own = own._replace(rhs=jit.address(rhs_hook, HOOK))
+        kept = []
+        kinds = configuration.kinds(len(self.system.body_ids), n)
+        for word in (at.UP, at.DOWN):
+            method = scheme.make(running, np.zeros(n), 0.0, kinds)
+            method.memory[scheme.TOL] = 1e300
+            space = scheme.Workspace(np.array(own, dtype=np.int64), method)
+            table = pack(space)
+            words[word] = int(table.ctypes.data)
+            kept.append((space, table))
+        words[at.METHOD] = int(workspace.ctypes.data)
+        words[at.TWIN] = int(self._table.ctypes.data)
+        words[at.ATTEMPT] = 0 if running.implicit else jit.address(running.attempt, HOOK)
+        words[at.FIT_DENSE] = 0 if running.implicit else jit.address(running.fit_dense, HOOK)
+        words[at.REMEMBERED] = self.system.scene.state.memory.shape[1]
+        words[at.JOINTS] = int(self.system.scene.world.hooks[Hook.JOINTS] != 0)
+        words[at.FITTED] = 0
+        joints = words[at.JOINTS] == 1
+        self.arrays = self.arrays._replace(
+            weights=np.zeros(0) if joints or running.implicit else _weights(running)
+        )
+        if self.arrays.dense.shape[1] != running.dense:
+            self.arrays = self.arrays._replace(
+                dense=np.zeros((len(self.directions), running.dense, n)),
+                path=np.zeros((running.dense, n)),
+            )
+        self._pack()
+        self._alive = kept
+
+    def take(self) -> None:
+        """Take the rows that were written beside the run's."""
+        used, words = self.twin.scene.rows.used, self.arrays.words
+        n, incidents, events = used.tolist()
+        rows = int(words[at.ROWS])
+        if rows:
+            self.gathered.take(n, incidents, events)
+            self._steps.append(self.arrays.step[:rows].copy())
+        used[:] = 0
+        words[at.ROWS] = 0
+
+    def mark(self) -> None:
+        """Remember where derivatives and rows are, for `go_back`."""
+        kept = tags.copies(self.arrays, tags.STATE)
+        self._mark = kept, self.gathered.copied(), list(self._steps)
+
+    def go_back(self) -> None:
+        """Go back to what was marked."""
+        kept, rows, self._steps = self._mark
+        dense = kept["dense"]
+        path = np.zeros(dense.shape[1:])
+        self.arrays = self.arrays._replace(dense=dense, path=path)
+        tags.put_back(self.arrays, tags.STATE, kept)
+        self.gathered.restore(rows)
+        self._pack()
+        self.twin.scene.rows.used[:] = 0
+        self.arrays.words[at.ROWS] = 0
+
+    def _pack(self) -> None:
+        """Let compiled code find the arrays."""
+        self._words = pack(self.arrays)
+        self.system.scene.world.hooks[AT] = int(self._words.ctypes.data)
+
+    def tables(self, asked: Sequence[str]) -> tuple[dict[str, Array], dict[str, dict[str, Any]]]:
+        """Return derivatives of all signals by dataset, and attributes of each parameter's group.
+
+        A derivative that is not known any more is NaN.
+        """
+        block, count = self.gathered.block, len(self.directions)
+        steps = np.concatenate(self._steps) if self._steps else np.zeros((0, count))
+        found: dict[str, Array] = {}
+        about: dict[str, dict[str, Any]] = {}
+        for k, direction in enumerate(self.directions):
+            e = steps[:, k]
+            sides = []
+            for side in range(2):
+                rows = slice(2 * k + side, None, 2 * count)
+                sides.append(dict(signals(self.twin, _part(block, rows), SignalFilter(asked))))
+            for name, up in sides[0].items():
+                if name.startswith(_NO_SIGNALS) or up.dtype.kind != "f":
+                    continue
+                wide = e.reshape(-1, *[1] * (up.ndim - 1))
+                found[f"sensitivity/{direction.name}/{name}"] = (up - sides[1][name]) / (2.0 * wide)
+            about[f"sensitivity/{direction.name}"] = {
+                "value": direction.value,
+                "steps_along": int(self.arrays.words[at.BENT]),
+                "evaluations": int(self.arrays.words[at.ASKED]),
+                "known_until": float(self.arrays.lost[k]),
+                "why": _WHY.get(int(self.arrays.why[k]), ""),
+            }
+        return found, about
+
+    @property
+    def lines(self) -> list[str]:
+        """What is to be said of derivatives that are not known to the end."""
+        return [
+            f"warning: sensitivity to {direction.name}: not known from time {lost:.6g} on: "
+            f"{_WHY[int(why)]}"
+            for direction, lost, why in zip(
+                self.directions, self.arrays.lost, self.arrays.why, strict=True
+            )
+            if lost < math.inf
+        ]
+
+
+def _part(block: Block, rows: slice) -> Block:
+    """Return some of the rows of a block, without incidents."""
+    fields = {f.name: getattr(block, f.name) for f in dataclasses.fields(Block)}
+    without = {name: fields[name][:0] for name in ("incidents", "points", "events")}
+    return Block(**{name: table[rows] for name, table in fields.items()} | without)
+
+
+def _by_path(scene: Any) -> list[tuple[str, Array]]:
+    """Return all arrays of a scene by path."""
+    return [pair for tag in tags.Tag for pair in tags.arrays(scene, tag)]
+
+
+def _steps(system: System, n: int) -> Array:
+    """Return half of the step of a difference in usual sizes of every number of y."""
+    found = np.full(n, STEP)
+    if system.contact_ids:
+        kinds = np.array(configuration.kinds(len(system.body_ids), n))
+        found[kinds != VELOCITY] = STEP_OF_CONTACTS
+    return found
+
+
+def _weights(running: scheme.Scheme) -> Array:
+    """Return by what weights an explicit method adds up its stages."""
+    from mbsim.integrators import dop853, dopri5
+
+    if running is dop853.SCHEME:
+        return np.array(dop853.A[12][:12])
+    return np.array((dopri5.B1, 0.0, dopri5.B3, dopri5.B4, dopri5.B5, dopri5.B6))
+
+
+def _scale(system: System, n: int) -> Array:
+    """Return the usual size of every number of y; of what only sums up none is needed."""
+    scale = system.scene.world.scale
+    length, speed = float(scale[SCALE_LENGTH]), float(scale[SCALE_SPEED])
+    of_a_body = [length] * 3 + [0.5] * 4 + [speed] * 3 + [speed / length] * 3
+    found = np.full(n, math.inf)
+    found[: len(of_a_body) * len(system.body_ids)] = of_a_body * len(system.body_ids)
+    states = np.asarray(system.scene.states.offset, dtype=np.int64)
+    found[states] = np.maximum(system.scene.states.scale, 1e-300)
+    # what friction carries is a stretch or a way over one, and follows the slip as exactly
+    places = system.scene.slots.x
+    for s in np.flatnonzero(places >= 0):
+        found[places[s] : places[s] + 2] = length
+    return found

@@ -1,0 +1,47 @@
+"""Points beside the run: the twin with a parameter a little changed.
+
+Derivatives along a direction are central differences of the equations, not of runs: both sides
+have the run's step, its committed contacts and its branches, so that they differ smoothly.
+"""
+
+from __future__ import annotations
+
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1
+from mbsim.core.jitable import jitable
+from mbsim.core.memory import floats_at
+from mbsim.sensitivity.arrays import REMEMBERED, Variations
+
+#: Half of the step of differences, in usual sizes of the parameter and of y.
+STEP = 1e-6
+#: The same of places where there are contacts: depths are far smaller than the model.
+STEP_OF_CONTACTS = 1e-9
+
+
+@jitable
+def half_step(V: Variations, k: int) -> float:
+    """Return by how much parameter k is changed to either side."""
+    largest = 1.0 / (STEP * V.size[k])
+    for i in range(len(V.room)):
+        largest = max(largest, abs(V.d[k, i]) / V.room[i])
+    return 1.0 / largest
+
+
+@jitable
+def set_parameter(V: Variations, twin: Scene, scene: Scene, k: int, e: float) -> None:
+    """Let parameter k of the twin be changed by e, and what follows from it of laws' memories."""
+    for j in range(V.first[k], V.first[k + 1]):
+        floats_at(V.place[j], 1)[0] = V.base[j] + e * V.slope[j]
+    if V.words[REMEMBERED] > 0:
+        state, own = scene.state, twin.state
+        for s in range(state.memory.shape[0]):
+            for j in range(state.memory.shape[1]):
+                own.memory[s, j] = state.memory[s, j] + e * V.memory[k, s, j]
+                own.before[s, j] = state.before[s, j] + e * V.before[k, s, j]
+
+
+@jitable
+def beside(V: Variations, y: F1, k: int, e: float, out: F1) -> None:
+    """Write y, moved by e along the derivative for parameter k, into `out`."""
+    for i in range(len(out)):
+        out[i] = y[i] + e * V.d[k, i]

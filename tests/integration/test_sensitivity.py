@@ -1,0 +1,197 @@
+"""Sensitivities against closed forms and differences of tight runs, and what is refused."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import mbsim
+from helpers.decks import run_model
+from helpers.folders import MODELS
+from mbsim.cli.main import main
+from mbsim.errors import ModelError, UnknownSignal
+
+SPRING = """<Deck><Model>
+<Body_Rigid id="1" isground="TRUE"/>
+<Body_Rigid id="2" cg_id="20" mass="2" inertia_xx="0.01" inertia_yy="0.02" inertia_zz="0.03"
+ v_ic_x="0.3" v_ic_x_flag="TRUE"/>
+<Reference_Marker id="10" body_id="1"/>
+<Reference_Marker id="20" body_id="2" pos_x="1.2"/>
+<Force_SpringDamper id="4" type="TRANSLATIONAL" i_marker_id="20" j_marker_id="10" stiffness="8"
+ length="1"/>
+<Reference_Variable id="6" expr="0.25"/>
+<Force_Vector_TwoBody id="5" type="ForceOnly" i_marker_id="20" j_floating_marker_id="10"
+ ref_marker_id="10" fx_expression="VARVAL(6)" fy_expression="0" fz_expression="0"/>
+</Model><Command>
+<Simulate analysis_type="Transient" end_time="5" print_interval="0.1"/>
+</Command></Deck>"""
+
+PENDULUM = """<Deck><Model>
+<Body_Rigid id="1" isground="TRUE"/>
+<Body_Rigid id="2" cg_id="20" mass="2" inertia_xx="0.1" inertia_yy="0.2" inertia_zz="0.17"/>
+<Body_Rigid id="3" cg_id="30" mass="1.5" inertia_xx="0.05" inertia_yy="0.2" inertia_zz="0.17"/>
+<Reference_Marker id="10" body_id="1"/>
+<Reference_Marker id="11" body_id="1" theta="1.5707963267948966"/>
+<Reference_Marker id="20" body_id="2" pos_x="0.5"/>
+<Reference_Marker id="21" body_id="2" theta="1.5707963267948966"/>
+<Reference_Marker id="22" body_id="2" pos_x="1.0"/>
+<Reference_Marker id="30" body_id="3" pos_x="1.4" pos_y="0.1"/>
+<Reference_Marker id="31" body_id="3" pos_x="1.0"/>
+<Constraint_Joint id="1" type="REVOLUTE" i_marker_id="21" j_marker_id="11"/>
+<Constraint_Joint id="2" type="SPHERICAL" i_marker_id="31" j_marker_id="22"/>
+<Force_SpringDamper id="5" type="TRANSLATIONAL" i_marker_id="30" j_marker_id="10" stiffness="20"
+ damping="0.3" length="0.9"/>
+<Force_Gravity grav_z="-9.81"/>
+<Post_Request id="7" type="MARKER_DISPLACEMENT" i_marker_id="30" j_marker_id="10"/>
+</Model><Command>
+<Simulate analysis_type="Transient" end_time="1" print_interval="0.05"/>
+</Command></Deck>"""
+
+
+def differences(deck, name, value, step, signals, **how):
+    """Return differences of order 4 of tight runs, signal by signal."""
+    runs = [
+        mbsim.simulate(deck, overrides={name: value + part * step}, tol=1e-12, **how)
+        for part in (1.0, -1.0, 0.5, -0.5)
+    ]
+    found = {}
+    for signal in signals:
+        whole = (runs[0][signal] - runs[1][signal]) / (2.0 * step)
+        half = (runs[2][signal] - runs[3][signal]) / step
+        found[signal] = (4.0 * half - whole) / 3.0
+    return found
+
+
+def off(found, truth):
+    """Return the largest difference over the largest value."""
+    return float(np.abs(found - truth).max() / np.abs(truth).max())
+
+
+@pytest.mark.parametrize("integrator", ["DOPRI5", "DOP853", "RADAU5"])
+def test_a_spring_is_as_its_closed_form(integrator):
+    names = {"k": "Force_SpringDamper[4].stiffness", "m": "Body_Rigid[2].mass"}
+    names |= {"v": "Body_Rigid[2].v_ic_x", "x": "Reference_Marker[20].pos_x"}
+    names |= {"F": "Reference_Variable[6].expr"}
+    run = mbsim.simulate(SPRING, integrator=integrator, tol=1e-9, sensitivity=list(names.values()))
+    plain = mbsim.simulate(SPRING, integrator=integrator, tol=1e-9)
+    assert (run["bodies/2/position"] == plain["bodies/2/position"]).all()
+    t, k, m, v, F = run["time"], 8.0, 2.0, 0.3, 0.25
+    w, u = math.sqrt(k / m), 0.2 - F / k  # u: from where it would rest
+    c, s = np.cos(w * t), np.sin(w * t)
+    by_w = -u * t * s + v * (t * c / w - s / w**2)
+    truth = {
+        "k": by_w / (2.0 * w * m) + F / k**2 * (c - 1.0),
+        "m": -by_w * w / (2.0 * m),
+        "v": s / w,
+        "x": c,
+        "F": (1.0 - c) / k,
+    }
+    for short, name in names.items():
+        assert off(run.sensitivity("bodies/2/position/x", name), truth[short]) < 1e-6
+        assert run.parameters[name]["known_until"] == math.inf
+
+
+@pytest.mark.parametrize("integrator", ["DOPRI5", "RADAU5"])
+def test_joints_forces_and_requests_are_as_differences_of_tight_runs(integrator):
+    names = {"Body_Rigid[2].mass": 2.0, "Force_SpringDamper[5].stiffness": 20.0}
+    signals = ("bodies/3/position", "bodies/3/angular_velocity", "joints/1/force", "requests/7")
+    run = mbsim.simulate(PENDULUM, integrator=integrator, tol=1e-9, sensitivity=list(names))
+    for name, value in names.items():
+        truth = differences(PENDULUM, name, value, 1e-2 * value, signals, integrator="DOP853")
+        for signal in signals:
+            assert off(run.sensitivity(signal, name), truth[signal]) < 1e-6
+
+
+def test_a_marker_of_a_joint_moves_where_the_joint_holds():
+    name = "Reference_Marker[31].pos_x"
+    run = mbsim.simulate(PENDULUM, integrator="DOPRI5", tol=1e-9, sensitivity=[name], end_time=0.5)
+    how = {"integrator": "DOP853", "end_time": 0.5}
+    truth = differences(PENDULUM, name, 1.0, 1e-4, ["bodies/3/position"], **how)
+    assert off(run.sensitivity("bodies/3/position", name), truth["bodies/3/position"]) < 1e-6
+
+
+@pytest.mark.parametrize("integrator", ["DOPRI5", "RADAU5"])
+def test_ten_impacts(integrator):
+    name = "Reference_Marker[20].pos_z"
+    how = {"print_interval": 0.06}
+    deck = MODELS / "bouncing_sphere.xml"
+    run = mbsim.simulate(deck, integrator=integrator, tol=1e-9, sensitivity=[name], **how)
+    truth = differences(deck, name, 0.6, 1e-6, ["bodies/2/velocity/z"], integrator="DOP853", **how)
+    found, sure = run.sensitivity("bodies/2/velocity/z", name), truth["bodies/2/velocity/z"]
+    flies = run["contacts/301/penetration"] == 0.0
+    assert np.count_nonzero(run["events"]["kind"] == "touch") == 10
+    assert np.abs(found - sure)[flies].max() < 5e-4 * np.abs(sure)[flies].max()
+    assert np.abs(found - sure)[flies & (run["time"] < 1.3)].max() < 1e-4 * 11.0
+
+
+def test_stick_and_slip_on_a_belt_are_as_their_closed_form():
+    # it slips from x = mu_s on, 1 by 0.2 later for every unit of mu_s; the spring gives 3e-5
+    name = "Force_Contact[301].mu_static"
+    how = {"end_time": 6.0, "integrator": "DOPRI5", "tol": 1e-9, "print_interval": 0.4}
+    with run_model("belt_stick_slip.xml", sensitivity=[name], **how) as run:
+        found, t = run.sensitivity("bodies/2/position/x", name), run["time"]
+        assert np.count_nonzero(run["events"]["kind"] == "stick") == 4
+        slips = run["events"]["time"][run["events"]["kind"] == "slip"][-1]
+        angle = t - slips
+        truth = np.cos(angle) + 5.0 * (0.5 * np.sin(angle) - 0.2 * np.cos(angle))
+        assert np.abs(found[(t > 0.0) & (angle < 0.0)]).max() < 4e-5
+        assert found[angle > 0.0] == pytest.approx(truth[angle > 0.0], rel=3e-3)
+
+
+def test_what_is_not_known_any_more_is_nan_and_said():
+    said = []
+    name = "Force_Contact[301].mu_dynamic"
+    how = {"end_time": 0.07, "integrator": "DOPRI5", "tol": 1e-8, "sensitivity": [name]}
+    with run_model("sdnd100.xml", notify=said.append, **how) as run:
+        until = run.parameters[name]["known_until"]
+        found = run.sensitivity("bodies/2/position/x", name)
+        assert until < 0.07
+        assert np.isnan(found[run["time"] > until]).all()
+        assert not np.isnan(found[run["time"] < until]).any()
+    assert any("not known from time" in line and name in line for line in said)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "said"),
+    [
+        ("Body_Rigid[9].mass", r"no Body_Rigid\[9\] in the deck"),
+        ("Body_Rigid[2].cg_id", "changes what the model is made of|cannot be changed"),
+        ("Force_SpringDamper[4].damping", "is not given in the deck"),
+        ("Force_Vector_TwoBody[5].fx_expression", "is no number"),
+        ("mass", "must be"),
+    ],
+)
+def test_what_is_no_parameter_is_refused_by_name(parameter, said):
+    with pytest.raises(ModelError, match=said):
+        mbsim.simulate(SPRING, sensitivity=[parameter])
+
+
+def test_methods_and_runs_without_sensitivities_are_refused():
+    name = "Body_Rigid[2].mass"
+    with pytest.raises(ModelError, match="integrator GALPHA has none"):
+        mbsim.simulate(SPRING, integrator="GALPHA", sensitivity=[name])
+    with pytest.raises(ModelError, match="named twice"):
+        mbsim.simulate(SPRING, sensitivity=[name, name])
+
+
+def test_they_are_kept_in_the_file(tmp_path):
+    deck, name = tmp_path / "spring.xml", "Body_Rigid[2].mass"
+    deck.write_text(SPRING)
+    command = ["run", str(deck), "-o", str(tmp_path), "--sensitivity", name]
+    done = CliRunner().invoke(main, command)
+    assert done.exit_code == 0, done.output
+    with mbsim.open_results(tmp_path / "spring.h5") as results:
+        found = results.sensitivity("bodies/2/position", name)
+        assert found.shape == results["bodies/2/position"].shape
+        assert (results.sensitivity("bodies/2/position/x", name) == found[:, 0]).all()
+        size = results.sensitivity("bodies/2/position/mag", name)
+        assert size == pytest.approx(found[:, 0] * np.sign(results["bodies/2/position/x"]))
+        assert name in results.parameters
+        assert not any(signal.startswith("sensitivity") for signal in results.signals())
+        with pytest.raises(UnknownSignal, match="--sensitivity"):
+            results.sensitivity("bodies/2/position", "Body_Rigid[2].inertia_xx")
+        with pytest.raises(UnknownSignal, match="no such signal"):
+            results.sensitivity("bodies/7/position", name)
