@@ -26,6 +26,7 @@ from mbsim.core.problem import (
     Problem,
 )
 from mbsim.integrators.scheme import (
+    AT_ONCE,
     LAST_ERROR,
     LOAD_THEN,
     LOOKS,
@@ -60,6 +61,9 @@ NEAR_CHANGE = 1e-9
 #: whole of it: bodies do not move at all in a very short one, for positions have no more digits,
 #: and then no side changes.
 FARTHER = 10.0
+#: The part of a step at which a force is looked at that leaves its branch at once: farther on it
+#: may be back on it, and nothing tells there that the step began where it could not.
+JUST_BEHIND = 1e-6
 #: How much the load of what friction holds may bend within a step, over its limit and sqrt(tol).
 BENT = 2.0
 
@@ -192,6 +196,9 @@ def look_at(p: Problem, m: Method, t: float, h: float) -> bool:
     if ask_switching(p, m, t + h, ASK, m.trial, m.error) > 0:
         m.memory[SWITCHED] = 1.0
         return True
+    if m.memory[AT_ONCE] == 1.0:
+        m.memory[SWITCHED] = JUST_BEHIND
+        return True
     if ask_switching(p, m, t + h, HIDES, m.trial, m.y) > 0:
         m.memory[LOOKS] += SIDES
     if ask_switching(p, m, t + h, BENDS, m.trial, m.y) > 0:
@@ -228,4 +235,6 @@ def serve(context: int, what: int, t: float, h: float, whole: float) -> float:
         changed = ask_switching(p, m, t + h, passed, m.trial, m.error) > 0
         in_vain = m.memory[SWITCH_CUT] == 1.0 and not changed
         m.memory[VAIN] = m.memory[VAIN] + 1.0 if in_vain else 0.0
+        leaves = changed and ask_switching(p, m, t + h, ASK, m.trial, m.error) > 1
+        m.memory[AT_ONCE] = 1.0 if leaves else 0.0
     return 0.0

@@ -103,7 +103,9 @@ KEEPS_TO_BOUND, FREE, PACE_FREE, PACE_WITHIN = range(60, 64)
 WINDOW_STEPS, WINDOW_STIFF, WINDOW_TIME, WINDOW_WORK, WINDOWS = range(64, 69)
 # 1 where velocities jump within the step that was tried: it has no polynomial, and ends at a row
 HITS = 69
-MEMORY = 70
+# 1 where a force leaves the branch at once that a change has just put it on
+AT_ONCE = 70
+MEMORY = 71
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)

@@ -246,6 +246,9 @@ def watch(scene: Scene, context: int, t: float, y: F1, what: float) -> int:
     passed = what == PASS or what == PASS_CUT
     if scene.switching.program[last] < 0 and scene.switching.force[last] < 0:
         # what friction does follows from all the rest
+        if what != ASK:
+            # rates of forces are others on another branch, at the same time
+            scene.work.slot[:, FOUND_AT] = math.nan
         look_at(scene, context, t, y, scene.work.idle)
         if what == ASK and len(scene.work.ahead) > 0:
             decide(scene, context, t, y)

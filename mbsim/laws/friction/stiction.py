@@ -280,6 +280,9 @@ def stiction(  # noqa: C901
                 own = abs(stretch - long) / since + stretch * abs(growth)
                 sure = 1 if abs(along) > CLEAR * own else 0
                 mode = SLIP if along >= 0.0 or sure == 0 else STICK
+            else:
+                # what has just begun to slip: forces, and how fast they change, are others now
+                sure = 0
         else:
             # as if nothing slipped since: it is held again where that is less than the limit
             length = long * math.exp(-ease * since) + stretch * (mx * ex + my * ey)
