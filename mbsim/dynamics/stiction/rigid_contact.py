@@ -29,10 +29,9 @@ from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.selection import LEVER, fill_size, sticks
 from mbsim.dynamics.contact.forces import FORCE, sides, velocity_at
 from mbsim.dynamics.contact.points import record_event
-from mbsim.dynamics.stiction.cones import CAPACITY, MOVES, SLIDE, SLIPPING, solve_cones
+from mbsim.dynamics.stiction.cones import CAPACITY, MOVES, SHARED, SLIDE, SLIPPING, solve_cones
 from mbsim.dynamics.stiction.rigid_friction import AT_REST, ROUNDING
 from mbsim.dynamics.stiction.rigid_shares import (
-    LEAST_PART,
     SLIDING,
     STATIC,
     WHICH,
@@ -40,6 +39,7 @@ from mbsim.dynamics.stiction.rigid_shares import (
     fill_cones,
     fill_slip,
     first_of_slots,
+    least_capacity,
     most_capacity,
     share_sticking,
 )
@@ -85,13 +85,14 @@ def settled(scene: Scene) -> float:
 def sticking_part(scene: Scene) -> float:
     """Return the largest force that holds a slot over what holds at most: above 1 some must slip.
 
-    What presses next to nothing has no limit of its own: the least is a part of the largest.
+    What presses next to nothing has no limit of its own.
     """
-    slot, part, least = scene.equations.slot, 0.0, LEAST_PART * most_capacity(scene)
+    slot, part, most = scene.equations.slot, 0.0, most_capacity(scene)
     for e in range(first_of_slots(scene), len(slot), 2):
         if not sticks(scene, e):
             continue
-        along, able = scene.work.sticking_force[slot[e]], max(capacity(scene, slot[e]), least)
+        along = scene.work.sticking_force[slot[e]]
+        able = max(capacity(scene, slot[e]), least_capacity(scene, slot[e], most))
         force = math.hypot(along[0], along[1])
         if able > 0.0:
             part = max(part, force / able)
@@ -276,17 +277,20 @@ def fill_sliding(scene: Scene, t: float, y: F1, count: int) -> None:
 
 
 @jitable
-def solve_slips(scene: Scene, count: int, r: int) -> float:
-    """Find what slips of the slots of so many rows; what begins to rubs as what slides."""
-    cone, most, grows = scene.sweep.cone, 0.0, True
+def solve_slips(scene: Scene, count: int, r: int, most: float) -> float:
+    """Find what slips of the slots of so many rows; what begins to rubs as what slides.
+
+    Returns the speed above which a slot does; `most` is what any holds at most.
+    """
+    cone, grows = scene.sweep.cone, True
     for k in range(count // 2):
         cone[STATIC, k] = cone[CAPACITY, k]
-        most = max(most, cone[CAPACITY, k])
     eps = 0.0
     while grows:
         grows = False
         for k in range(count // 2):
-            cone[CAPACITY, k] = max((1.0 - OVER) * cone[STATIC, k], LEAST_PART * most)
+            s = scene.equations.slot[int(cone[WHICH, k])]
+            cone[CAPACITY, k] = (1.0 - OVER) * max(cone[STATIC, k], least_capacity(scene, s, most))
         _, eps = solve_cones(scene.sweep.share, count, r, cone, scene.sweep.mix, SLIPPING)
         for k in range(count // 2):
             slips = math.hypot(cone[SLIDE, 2 * k], cone[SLIDE, 2 * k + 1]) > MOVES * eps
@@ -297,15 +301,28 @@ def solve_slips(scene: Scene, count: int, r: int) -> float:
 
 
 @jitable
-def release_sticking(scene: Scene, t: float, y: F1) -> int:
-    """Let slip what is not held of what sticks, the way it is accelerated; return how many do."""
-    hold_implied(scene, t, y)
-    share_sticking(scene, t, y)
-    if sticking_part(scene) <= 1.0:
-        return 0
-    count, r = fill_cones(scene, t, y, most_capacity(scene))
-    fill_sliding(scene, t, y, count)
-    released, least, cone = 0, solve_slips(scene, count, r), scene.sweep.cone
+def solve_mechanism(scene: Scene, count: int, r: int, most: float) -> float:
+    """Find how what sticks would begin to slip, however slowly; return as `solve_slips` does.
+
+    Accelerations are known to a part of those of what presses most, and where shapes have just
+    touched beside that theirs are less. Which way the limit gives first the dual of shares tells,
+    whatever the size; inf where sliding there would rub more than pulls.
+    """
+    cone = scene.sweep.cone
+    for k in range(count // 2):
+        s = scene.equations.slot[int(cone[WHICH, k])]
+        cone[CAPACITY, k] = max(capacity(scene, s), least_capacity(scene, s, most))
+    _, eps = solve_cones(scene.sweep.share, count, r, cone, scene.sweep.mix, SHARED)
+    rubs = 0.0
+    for k in range(count // 2):
+        rubs += cone[SLIDING, k] * math.hypot(cone[SLIDE, 2 * k], cone[SLIDE, 2 * k + 1])
+    return MOVES * eps if rubs < 1.0 else math.inf
+
+
+@jitable
+def let_go(scene: Scene, y: F1, count: int, least: float) -> int:
+    """Let slip the slots of so many rows that move faster than `least`; return how many do."""
+    released, cone = 0, scene.sweep.cone
     for k in range(count // 2):
         x, z = cone[SLIDE, 2 * k], cone[SLIDE, 2 * k + 1]
         if math.hypot(x, z) > least:
@@ -313,6 +330,22 @@ def release_sticking(scene: Scene, t: float, y: F1) -> int:
             v = slip_of(scene, y, s)
             let_slip(scene, s, -x, -z, 0.0, math.hypot(v[0], v[1]))
             released += 1
+    return released
+
+
+@jitable
+def release_sticking(scene: Scene, t: float, y: F1) -> int:
+    """Let slip what is not held of what sticks, the way it is accelerated; return how many do."""
+    hold_implied(scene, t, y)
+    share_sticking(scene, t, y)
+    if sticking_part(scene) <= 1.0:
+        return 0
+    most = most_capacity(scene)
+    count, r = fill_cones(scene, t, y, most)
+    fill_sliding(scene, t, y, count)
+    released = let_go(scene, y, count, solve_slips(scene, count, r, most))
+    if released == 0:
+        released = let_go(scene, y, count, solve_mechanism(scene, count, r, most))
     if released == 0:
         # sliding would rub more than sticking holds: it goes on to stick
         code = call_int(scene.world.hooks[Hook.EVALUATE], (scene, t, 0.0, y, scene.work.idle))
