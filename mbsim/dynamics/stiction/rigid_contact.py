@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED, TOLERANCE
+from mbsim.arrays.codes import CHANGED, SCALE_LENGTH, SCALE_SPEED, TOLERANCE
 from mbsim.arrays.codes import SLIP as SLIP_EVENT
 from mbsim.arrays.codes import STICK as STICK_EVENT
 from mbsim.arrays.hooks import Hook, Sticking, note_failure
@@ -27,7 +27,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, sub, vector
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.selection import LEVER, fill_size, sticks
-from mbsim.dynamics.contact.forces import FORCE, sides, velocity_at
+from mbsim.dynamics.contact.forces import FORCE, contact_of, sides, velocity_at
 from mbsim.dynamics.contact.points import record_event
 from mbsim.dynamics.stiction.cones import CAPACITY, MOVES, SHARED, SLIDE, SLIPPING, solve_cones
 from mbsim.dynamics.stiction.rigid_friction import AT_REST, ROUNDING
@@ -183,15 +183,21 @@ def begin_slot(scene: Scene, y: F1, s: int) -> int:
 
 
 @jitable
-def came_to_rest(scene: Scene, pair: int) -> bool:
-    """Return whether a slot of a pair sticks that did not."""
+def came_to_rest(scene: Scene, group: int) -> bool:
+    """Return whether a slot sticks that did not, of a group of bodies that are connected."""
     slot = scene.equations.slot
     for e in range(first_of_slots(scene), len(slot), 2):
         s = slot[e]
-        if scene.slots.pair[s] == pair and scene.state.memory[s, KEPT_MODE] == STICK:
+        if group_of(scene, s) == group and scene.state.memory[s, KEPT_MODE] == STICK:
             if not was_sticking(scene, s):
                 return True
     return False
+
+
+@jitable
+def group_of(scene: Scene, s: int) -> int:
+    """Return the group of connected bodies that slot s is of."""
+    return scene.scales.of_contact[contact_of(scene, s)]
 
 
 @jitable
@@ -199,7 +205,8 @@ def begin_sticking(scene: Scene, y: F1) -> int:
     """Set the modes that the point evaluated last asks for; return whether equations change.
 
     What is at rest is first taken to stick wherever something changes, and what is as good as at
-    rest beside what comes to rest: what of it slips is found for all together (`release_sticking`).
+    rest where something of its group comes to rest: what of it slips is found for all together
+    (`release_sticking`). Corner by corner each would turn at a time of its own, at any speed.
     """
     state, slot, first = scene.state, scene.equations.slot, first_of_slots(scene)
     changed, sticking, begun = 1 if sticking_part(scene) > 1.0 else 0, 0, 0
@@ -220,7 +227,7 @@ def begin_sticking(scene: Scene, y: F1) -> int:
         s = slot[e]
         if state.memory[s, KEPT_MODE] == SLIP and state.touching[s] == 1:
             v, least = slip_of(scene, y, s), AT_REST * rest(scene)
-            if came_to_rest(scene, scene.slots.pair[s]):
+            if came_to_rest(scene, group_of(scene, s)):
                 least = max(least, settled(scene))
             if math.hypot(v[0], v[1]) <= least:
                 let_stick(scene, s)
@@ -355,7 +362,16 @@ def release_sticking(scene: Scene, t: float, y: F1) -> int:
 
 
 @jitable
-def record_sticking(scene: Scene, t: float) -> None:
+def keep_play(scene: Scene, y: F1, s: int) -> None:
+    """Keep how slot s moves that was let go: as all that goes on to stick lets it from here on."""
+    kept, v = scene.state.memory[s], slip_of(scene, y, s)
+    play = math.hypot(v[0], v[1])
+    if play > kept[KEPT_PLAY]:
+        let_slip(scene, s, kept[KEPT_X], kept[KEPT_Y], 0.0, play)
+
+
+@jitable
+def record_sticking(scene: Scene, t: float, y: F1) -> None:
     """Append events of the slots that go on otherwise than before."""
     state, slot = scene.state, scene.equations.slot
     for e in range(first_of_slots(scene), len(slot), 2):
@@ -365,10 +381,14 @@ def record_sticking(scene: Scene, t: float) -> None:
             before[KEPT_MODE] = BEGUN
             kept[KEPT_X] = rest(scene) + settled(scene)
             continue
+        if kept[KEPT_MODE] == SLIP and kept[KEPT_SPEED] == 0.0:
+            keep_play(scene, y, s)
         if before[KEPT_MODE] == BEGUN:
             # rows of the step in which it began show what holds from there on
             for k in range(len(before)):
                 before[k] = kept[k]
+        if kept[KEPT_MODE] != before[KEPT_MODE]:
+            state.chattering[CHANGED] += 1.0
         turned = kept[KEPT_X] * before[KEPT_X] + kept[KEPT_Y] * before[KEPT_Y] < 0.0
         if kept[KEPT_MODE] == STICK and before[KEPT_MODE] == SLIP:
             record_event(scene, t, STICK_EVENT, s)
@@ -404,7 +424,7 @@ def serve_sticking(scene: Scene, what: int, t: float, y: F1) -> int:
     elif what == Sticking.RELEASE:
         return release_sticking(scene, t, y)
     elif what == Sticking.RECORD:
-        record_sticking(scene, t)
+        record_sticking(scene, t, y)
     elif what == Sticking.CHANGED:
         return changed_sticking(scene)
     elif what == Sticking.LOAD:
