@@ -320,10 +320,10 @@ def solve_mechanism(scene: Scene, count: int, r: int, most: float) -> float:
         s = scene.equations.slot[int(cone[WHICH, k])]
         cone[CAPACITY, k] = max(capacity(scene, s), least_capacity(scene, s, most))
     _, eps = solve_cones(scene.sweep.share, count, r, cone, scene.sweep.mix, SHARED)
-    rubs = 0.0
+    friction = 0.0
     for k in range(count // 2):
-        rubs += cone[SLIDING, k] * math.hypot(cone[SLIDE, 2 * k], cone[SLIDE, 2 * k + 1])
-    return MOVES * eps if rubs < 1.0 else math.inf
+        friction += cone[SLIDING, k] * math.hypot(cone[SLIDE, 2 * k], cone[SLIDE, 2 * k + 1])
+    return MOVES * eps if friction < 1.0 else math.inf
 
 
 @jitable
