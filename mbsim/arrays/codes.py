@@ -224,8 +224,9 @@ SLIDER, SLIDES, SLIDER_BEFORE, SLIDES_BEFORE = range(4)
 
 # columns of `State.sides`: see events.switching
 SIDE, CHATTERING = range(2)
-# entries of `State.chattering`: how often sticking changed of late, whether it asks to change now
-CHANGES, ASKS = range(2)
+# entries of `State.chattering`: how often sticking changed of late, whether it asks to change now;
+# how many incidents that go on changed their mode since the last step was passed
+CHANGES, ASKS, CHANGED = range(3)
 #: What chatters more changes at nearly every step, as the sign of what is at rest does: then
 #: steps are not cut there.
 CHATTERS = 4.0
@@ -301,6 +302,9 @@ SPARE = 24 + SLOT_COLUMNS
 #: How a friction law is asked on a rim (`contact.rims`): at its points, all round it, at a place
 #: for each point; and how many numbers of a law's memory are a stretch.
 AT_POINTS, AROUND_RIM, AT_PLACES = range(3)
+#: `Kinds.moves`: rows are parts of a shape, so that incidents keep them; they are none; or they
+#: are, but friction that sticks is held at a place, which has another row behind an edge.
+AT_ROWS, NO_ROWS, HELD_AT_PLACES = range(3)
 STRETCH = 2
 # columns of `Rows.contact`, of each contact; force and torque take three
 CONTACT_FORCE, CONTACT_TORQUE, CONTACT_DEPTH, CONTACT_SLIP = 0, 3, 6, 7

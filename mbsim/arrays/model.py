@@ -48,7 +48,7 @@ class Kinds(NamedTuple):
     whole: F1  # (nk,) shares of a flat face, where incidents have an area; else 0
     rims: I1  # (nk,) 1 where each three rows are of one rim: `contact.rims`
     step: I1  # (nk,) rows from one incident to the next: 1 for points, all where a pair is one
-    moves: I1  # (nk,) 1 where a row is no part of a shape: incidents keep their slots by place
+    moves: I1  # (nk,) whether incidents keep their slots by place: AT_ROWS, or why
     noise: F1  # (nk,) scatter of the normals that its detector gives
     bound: I1  # (nk,) address of its motion bound, 0 for none
     pressure: I1  # (nk,) 1 where the law gives a pressure over the patch, and no force

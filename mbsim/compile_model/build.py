@@ -29,7 +29,7 @@ from mbsim.compile_model.mechanism import sweep
 from mbsim.compile_model.pairing import Plans, plan_pairs
 from mbsim.compile_model.rigid_slots import rigid_slots
 from mbsim.compile_model.scratch import Sizes, empty_log, empty_rows, scratch, start_state
-from mbsim.compile_model.switching import has_modes
+from mbsim.compile_model.switching import has_modes, sticking
 from mbsim.compile_model.user_code import UserCode, load_user_code, no_residuals, users_table
 from mbsim.core.collection import no_collection
 from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
@@ -318,7 +318,7 @@ def _scene(
     scene = Scene(
         bodies=_bodies(placement),
         graphics=contacts.graphics,
-        kinds=kinds_table(plans.kinds, contacts.contact_row),
+        kinds=kinds_table(plans.kinds, contacts.contact_row, sticking(model)),
         pairs=contacts.pairs,
         broadphase=contacts.broadphase,
         contacts=contacts.laws,

@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbsim.arrays import codes
-from mbsim.arrays.codes import AROUND_RIM, AT_PLACES, AT_POINTS, STRETCH
+from mbsim.arrays.codes import (
+    AROUND_RIM,
+    AT_PLACES,
+    AT_POINTS,
+    AT_ROWS,
+    HELD_AT_PLACES,
+    NO_ROWS,
+    STRETCH,
+)
 from mbsim.arrays.model import Contacts, Graphics, Kinds, Slots
 from mbsim.arrays.state import Broadphase, Pairs
 from mbsim.compile_model.pairing import (
@@ -141,6 +149,10 @@ def graphics_table(
     return made
 
 
+#: Pairs whose corner has another row behind an edge of the other shape.
+PASSED_ON = frozenset({"BOX-BOX"})
+
+
 def _face_weight(kind: Kind) -> float:
     """Return the shares of a flat face where incidents of a kind have an area, else 0."""
     if kind.region:
@@ -155,8 +167,18 @@ def _noise(kind: Kind) -> float:
     return states_noise(kind.shape_i, kind.shape_j)
 
 
-def kinds_table(kinds: list[Kind], contacts: dict[int, int]) -> Kinds:
-    """Return how pairs are tested; `contacts` is the contact row by id."""
+def _moves(kind: Kind, sticks: bool) -> int:
+    """Return whether incidents of a kind keep their slots by place, as in `Kinds`."""
+    if kind.moves:
+        return NO_ROWS
+    return HELD_AT_PLACES if sticks and kind.closed_form in PASSED_ON else AT_ROWS
+
+
+def kinds_table(kinds: list[Kind], contacts: dict[int, int], sticks: Set[int]) -> Kinds:
+    """Return how pairs are tested; `contacts` is the contact row by id.
+
+    `sticks` are the ids of those whose friction sticks.
+    """
     return Kinds(
         contact=np.array([contacts[k.contact] for k in kinds], dtype=np.int64),
         kernel=np.array([kernel_address(k) for k in kinds], dtype=np.int64),
@@ -166,7 +188,7 @@ def kinds_table(kinds: list[Kind], contacts: dict[int, int]) -> Kinds:
         whole=np.array([_face_weight(k) for k in kinds]),
         rims=np.array([k.rims for k in kinds], dtype=np.int64),
         step=np.array([k.step for k in kinds], dtype=np.int64),
-        moves=np.array([k.moves for k in kinds], dtype=np.int64),
+        moves=np.array([_moves(k, k.contact in sticks) for k in kinds], dtype=np.int64),
         noise=np.array([0.0 if k.closed_form else _noise(k) for k in kinds]),
         bound=np.array([motion_bound_address(k.closed_form) for k in kinds], dtype=np.int64),
         pressure=np.array(["FIELD" in k.closed_form.split("-") for k in kinds], dtype=np.int64),

@@ -144,8 +144,16 @@ def has_modes(model: Model) -> bool:
     """Return whether some friction is one that sticks or slips."""
     if any(model.table(kind.name) for kind in memories()):
         return True
-    laws = [contact.cff_type for contact in model.contacts.values()]
-    return any(law in FRICTION_LAWS and FRICTION_LAWS[law].modes for law in laws)
+    return bool(sticking(model))
+
+
+def sticking(model: Model) -> set[int]:
+    """Return the ids of the contacts whose friction sticks or slips."""
+    return {
+        id
+        for id, contact in model.contacts.items()
+        if contact.cff_type in FRICTION_LAWS and FRICTION_LAWS[contact.cff_type].modes
+    }
 
 
 def switching_table(

@@ -50,7 +50,8 @@ def clip(
             out[kept, TAG] = polygon[k, TAG]
             kept += 1
         if (here <= tie) != (there <= tie) and kept < capacity:
-            part = here / (here - there)
+            # one that stays though it is outside is where its edge goes out or comes in
+            part = min(1.0, max(0.0, here / (here - there)))
             out[kept, X] = polygon[k, X] + part * (polygon[after, X] - polygon[k, X])
             out[kept, Y] = polygon[k, Y] + part * (polygon[after, Y] - polygon[k, Y])
             # leaving, the border begins here; coming back, what is left of the edge does

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import CONSTRAINTS_CHANGED, NOW, STICK
+from mbsim.arrays.codes import CHANGED, CONSTRAINTS_CHANGED, NOW, STICK
 from mbsim.arrays.codes import SLIP as SLIP_EVENT
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
@@ -112,6 +112,8 @@ def commit_memory(scene: Scene, t: float, y: F1, s: int, fresh: bool) -> int:
     mode, before = branch % catalog.BRANCHES, state.mode[s] % catalog.BRANCHES
     if mode != before and mode > 0.0 and before > 0.0:
         record_event(scene, t, STICK if mode == catalog.STICK else SLIP_EVENT, s)
+    if before > 0.0 and not fresh:
+        state.chattering[CHANGED] += 1.0
     if mode != before:
         # which decides what the carried numbers are
         for k in range(scene.contacts.carried[contact_of(scene, s)]):

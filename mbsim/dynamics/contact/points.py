@@ -12,6 +12,7 @@ from mbsim.arrays.codes import (
     ACTIVE,
     APPROACH,
     AT_FAULT,
+    AT_ROWS,
     BEYOND_I,
     BEYOND_J,
     BEYOND_TIME,
@@ -21,7 +22,9 @@ from mbsim.arrays.codes import (
     EVENT_SLOT,
     EVENT_TIME,
     FIRST_TOUCH,
+    HELD_AT_PLACES,
     LEAVE,
+    NO_ROWS,
     REBOUND,
     SCALE_LENGTH,
     TOO_DEEP,
@@ -34,7 +37,7 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import cross, dot, rotate, sub, unrotate, vector
+from mbsim.core.rotation import cross, dot, norm, rotate, sub, unrotate, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.detection import measure_pair
 from mbsim.dynamics.contact.forces import (
@@ -49,6 +52,9 @@ from mbsim.dynamics.contact.forces import (
 from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT
 from mbsim.laws.abi import ELASTIC, ENERGY
 
+#: Incidents nearer to each other than this part of half of the least width of two shapes are at the
+#: same corner.
+SAME_PLACE = 0.1
 #: Part of the way from touch to where their middles meet at which shapes are too deep.
 MIDDLE = 0.8
 
@@ -257,8 +263,9 @@ def commit_slot(scene: Scene, t: float, h: float, y: F1, s: int) -> int:
         state.depth[s] = work.slot[s, DEPTH]
         state.rate[s] = work.slot[s, RATE]
         state.normal[s] = work.slot[s, NORMAL]
-        framed = scene.contacts.framed[contact_of(scene, s)] == 1 or scene.kinds.moves[kind] == 1
-        if scene.world.fixed_step[0] == 0 or framed:
+        placed = scene.kinds.moves[kind] != AT_ROWS
+        framed = scene.contacts.framed[contact_of(scene, s)] == 1
+        if scene.world.fixed_step[0] == 0 or framed or placed:
             for k in range(3):
                 state.p[s, k] = work.points[s, AT_POINT + k]
                 state.n[s, k] = work.points[s, AT_NORMAL + k]
@@ -305,7 +312,7 @@ def log_deep(scene: Scene, t: float) -> None:
         c = contact_of(scene, hit[k])
         way = graphics.width[gi] + graphics.width[gj]
         kind = scene.pairs.kind[scene.slots.pair[hit[k]]]
-        told = scene.kinds.moves[kind] == 1 and scene.kinds.kernel[kind] != 0
+        told = scene.kinds.moves[kind] == NO_ROWS and scene.kinds.kernel[kind] != 0
         known = told or work.points[hit[k], AT_DEPTH] <= MIDDLE * way
         if not known and work.beyond[c] == 0:
             work.beyond[c] = 1 + scene.slots.pair[hit[k]]
@@ -368,6 +375,35 @@ def exchange(scene: Scene, a: int, b: int, step: int) -> None:
 
 
 @jitable
+def same_place(scene: Scene, pair: int) -> float:
+    """Return how near to each other incidents of a pair are at the same corner of a shape."""
+    width = scene.graphics.width
+    return SAME_PLACE * min(width[scene.pairs.graphic_i[pair]], width[scene.pairs.graphic_j[pair]])
+
+
+@jitable
+def pass_on(scene: Scene, pair: int) -> None:
+    """Give what a corner has become behind an edge the slot that the corner had.
+
+    A row that is an incident where it is committed to be one is the same. One that is not takes
+    the slot of one that was, at its place.
+    """
+    first, state, points = scene.pairs.slot[pair], scene.state, scene.work.points
+    last = first + scene.kinds.slots[scene.pairs.kind[pair]]
+    for k in range(first, last):
+        if points[k, AT_DEPTH] <= 0.0 or state.touching[k] == 1:
+            continue
+        slot, least = -1, same_place(scene, pair)
+        for s in range(first, last):
+            if state.touching[s] == 1 and points[s, AT_DEPTH] <= 0.0:
+                way = norm(sub(vector(points[k, AT_POINT:]), vector(state.p[s])))
+                if way < least:
+                    slot, least = s, way
+        if slot >= 0:
+            exchange(scene, slot, k, 1)
+
+
+@jitable
 def keep_slots(scene: Scene, pair: int) -> None:
     """Give incidents the slots of the committed ones that are nearest to them, nearest pair first.
 
@@ -376,6 +412,9 @@ def keep_slots(scene: Scene, pair: int) -> None:
     """
     pairs, state, work = scene.pairs, scene.state, scene.work
     if pairs.touches[pair] == 0:
+        return
+    if scene.kinds.moves[pairs.kind[pair]] == HELD_AT_PLACES:
+        pass_on(scene, pair)
         return
     kind, first = pairs.kind[pair], pairs.slot[pair]
     step, last = scene.kinds.step[kind], first + scene.kinds.slots[kind]

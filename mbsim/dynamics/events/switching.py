@@ -1,8 +1,8 @@
 """Where the step under trial leaves the branch that a force was on: see `compile_model.switching`.
 
-What an expression or a force with branches is on is a number, its side; so is what all incidents do
-whose friction has modes. The driver ends a step where a side becomes another than it was at the
-committed state.
+What an expression or a force with branches is on is a number, its side. The driver ends a step
+where a side becomes another than it was at the committed state, and where an incident that goes on
+asks for another mode of its friction: one that ends, or begins, has none to leave.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import math
 from mbsim.arrays.codes import (
     ASKS,
     AUDIT_TOL,
+    CHANGED,
     CHANGES,
     CHATTERING,
     CHATTERS,
@@ -81,18 +82,6 @@ EVEN = 1e-3
 #: Over a shorter part of its length a spring that slips does not stick and slip unseen: it hardly
 #: turns, and where slip is rounding its way has no direction.
 SHORT_WAY = 0.01
-
-
-@jitable
-def modes(scene: Scene) -> float:
-    """Return a number that tells what the incidents that go on do: stick or slip."""
-    total, hit = 0.0, scene.work.hit
-    for k in range(hit[len(hit) - 1]):
-        s = hit[k]
-        if scene.state.touching[s] == 1:
-            branch = scene.work.slot[s, BRANCH]
-            total += (1.0 + s) * (scene.state.mode[s] if branch == UNDECIDED else branch)
-    return total
 
 
 @jitable
@@ -185,7 +174,8 @@ def side(scene: Scene, t: float, y: F1, k: int) -> float:
     if program >= 0:
         return value(scene, t, y, program)
     if scene.switching.force[k] < 0:
-        return modes(scene)
+        # of friction with modes: what asks for another one, and what has changed, is counted
+        return 0.0
     f = scene.switching.force[k]
     if scene.applied.equation[f] >= 0:
         return side_of_rigid(scene, y, f)
@@ -197,13 +187,14 @@ def watch_sticking(scene: Scene, t: float, y: F1, what: float) -> int:
     """Return 2 if a contact whose friction is rigid asks for another mode than it has, else 0.
 
     Of a step that was taken: 1 if it ends so. Such a step adds 1, whether a mode changed then or
-    not; one that does not leaves half of the chattering. So where changes follow each other a whole
-    step is taken now and then; one that was cut a little before a change is none.
+    not; one that does not leaves half of the chattering, unless it was cut: a little before a
+    change it tells nothing. So where changes follow each other a whole step is taken now and then.
     """
     chattering, differs = scene.state.chattering, 0
     if what == PASS or what == PASS_CUT:
         differs, before = 1 if chattering[ASKS] == 1.0 else 0, chattering[CHANGES]
-        chattering[CHANGES] = before + 1.0 if differs == 1 else 0.5 * before
+        cooled = 0.5 * before if what == PASS else before
+        chattering[CHANGES] = before + 1.0 if differs == 1 else cooled
         chattering[ASKS] = 0.0
     elif chattering[CHANGES] <= CHATTERS:
         asked = call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.ASK, t, y))
@@ -258,11 +249,12 @@ def watch(scene: Scene, context: int, t: float, y: F1, what: float) -> int:
         now = side(scene, t, y, k)
         other = now != sides[k, SIDE]
         f = scene.switching.force[k]
-        keeps = f >= 0 and scene.applied.keeps[f] == 1
+        keeps, of_modes = f >= 0 and scene.applied.keeps[f] == 1, False
+        if k == last and f < 0 and scene.switching.program[k] < 0:
+            of_modes = leaves_branch(scene)
+            other = scene.state.chattering[CHANGED] > 0.0
         # friction with a memory of its own is on the side that it keeps
-        exact = keeps or (
-            k == last and f < 0 and scene.switching.program[k] < 0 and leaves_branch(scene)
-        )
+        exact = keeps or of_modes
         leaves = now != scene.state.dry[f, SLIDES] if keeps else exact or other
         # a jump is found exactly too: what is wrong of one goes with the part of the step
         jumps = scene.switching.jumps[k] == 1
@@ -277,6 +269,8 @@ def watch(scene: Scene, context: int, t: float, y: F1, what: float) -> int:
             sides[k, CHATTERING] = COOLING * sides[k, CHATTERING] + (1.0 if other else 0.0)
         if what != ASK:
             sides[k, SIDE] = now
+    if what != ASK:
+        scene.state.chattering[CHANGED] = 0.0
     if scene.world.hooks[Hook.STICKING] != 0:
         differs = max(differs, watch_sticking(scene, t, y, what))
     # where modes change at nearly every step they are left to each evaluation

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED, TOLERANCE
+from mbsim.arrays.codes import CHANGED, SCALE_LENGTH, SCALE_SPEED, TOLERANCE
 from mbsim.arrays.codes import SLIP as SLIP_EVENT
 from mbsim.arrays.codes import STICK as STICK_EVENT
 from mbsim.arrays.hooks import Hook, Sticking, note_failure
@@ -27,12 +27,11 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, sub, vector
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.selection import LEVER, fill_size, sticks
-from mbsim.dynamics.contact.forces import FORCE, sides, velocity_at
+from mbsim.dynamics.contact.forces import FORCE, contact_of, sides, velocity_at
 from mbsim.dynamics.contact.points import record_event
-from mbsim.dynamics.stiction.cones import CAPACITY, MOVES, SLIDE, SLIPPING, solve_cones
+from mbsim.dynamics.stiction.cones import CAPACITY, MOVES, SHARED, SLIDE, SLIPPING, solve_cones
 from mbsim.dynamics.stiction.rigid_friction import AT_REST, ROUNDING
 from mbsim.dynamics.stiction.rigid_shares import (
-    LEAST_PART,
     SLIDING,
     STATIC,
     WHICH,
@@ -40,6 +39,7 @@ from mbsim.dynamics.stiction.rigid_shares import (
     fill_cones,
     fill_slip,
     first_of_slots,
+    least_capacity,
     most_capacity,
     share_sticking,
 )
@@ -85,13 +85,14 @@ def settled(scene: Scene) -> float:
 def sticking_part(scene: Scene) -> float:
     """Return the largest force that holds a slot over what holds at most: above 1 some must slip.
 
-    What presses next to nothing has no limit of its own: the least is a part of the largest.
+    What presses next to nothing has no limit of its own.
     """
-    slot, part, least = scene.equations.slot, 0.0, LEAST_PART * most_capacity(scene)
+    slot, part, most = scene.equations.slot, 0.0, most_capacity(scene)
     for e in range(first_of_slots(scene), len(slot), 2):
         if not sticks(scene, e):
             continue
-        along, able = scene.work.sticking_force[slot[e]], max(capacity(scene, slot[e]), least)
+        along = scene.work.sticking_force[slot[e]]
+        able = max(capacity(scene, slot[e]), least_capacity(scene, slot[e], most))
         force = math.hypot(along[0], along[1])
         if able > 0.0:
             part = max(part, force / able)
@@ -182,15 +183,21 @@ def begin_slot(scene: Scene, y: F1, s: int) -> int:
 
 
 @jitable
-def came_to_rest(scene: Scene, pair: int) -> bool:
-    """Return whether a slot of a pair sticks that did not."""
+def came_to_rest(scene: Scene, group: int) -> bool:
+    """Return whether a slot sticks that did not, of a group of bodies that are connected."""
     slot = scene.equations.slot
     for e in range(first_of_slots(scene), len(slot), 2):
         s = slot[e]
-        if scene.slots.pair[s] == pair and scene.state.memory[s, KEPT_MODE] == STICK:
+        if group_of(scene, s) == group and scene.state.memory[s, KEPT_MODE] == STICK:
             if not was_sticking(scene, s):
                 return True
     return False
+
+
+@jitable
+def group_of(scene: Scene, s: int) -> int:
+    """Return the group of connected bodies that slot s is of."""
+    return scene.scales.of_contact[contact_of(scene, s)]
 
 
 @jitable
@@ -198,7 +205,8 @@ def begin_sticking(scene: Scene, y: F1) -> int:
     """Set the modes that the point evaluated last asks for; return whether equations change.
 
     What is at rest is first taken to stick wherever something changes, and what is as good as at
-    rest beside what comes to rest: what of it slips is found for all together (`release_sticking`).
+    rest where something of its group comes to rest: what of it slips is found for all together
+    (`release_sticking`). Corner by corner each would turn at a time of its own, at any speed.
     """
     state, slot, first = scene.state, scene.equations.slot, first_of_slots(scene)
     changed, sticking, begun = 1 if sticking_part(scene) > 1.0 else 0, 0, 0
@@ -219,7 +227,7 @@ def begin_sticking(scene: Scene, y: F1) -> int:
         s = slot[e]
         if state.memory[s, KEPT_MODE] == SLIP and state.touching[s] == 1:
             v, least = slip_of(scene, y, s), AT_REST * rest(scene)
-            if came_to_rest(scene, scene.slots.pair[s]):
+            if came_to_rest(scene, group_of(scene, s)):
                 least = max(least, settled(scene))
             if math.hypot(v[0], v[1]) <= least:
                 let_stick(scene, s)
@@ -276,17 +284,20 @@ def fill_sliding(scene: Scene, t: float, y: F1, count: int) -> None:
 
 
 @jitable
-def solve_slips(scene: Scene, count: int, r: int) -> float:
-    """Find what slips of the slots of so many rows; what begins to rubs as what slides."""
-    cone, most, grows = scene.sweep.cone, 0.0, True
+def solve_slips(scene: Scene, count: int, r: int, most: float) -> float:
+    """Find what slips of the slots of so many rows; what begins to rubs as what slides.
+
+    Returns the speed above which a slot does; `most` is what any holds at most.
+    """
+    cone, grows = scene.sweep.cone, True
     for k in range(count // 2):
         cone[STATIC, k] = cone[CAPACITY, k]
-        most = max(most, cone[CAPACITY, k])
     eps = 0.0
     while grows:
         grows = False
         for k in range(count // 2):
-            cone[CAPACITY, k] = max((1.0 - OVER) * cone[STATIC, k], LEAST_PART * most)
+            s = scene.equations.slot[int(cone[WHICH, k])]
+            cone[CAPACITY, k] = (1.0 - OVER) * max(cone[STATIC, k], least_capacity(scene, s, most))
         _, eps = solve_cones(scene.sweep.share, count, r, cone, scene.sweep.mix, SLIPPING)
         for k in range(count // 2):
             slips = math.hypot(cone[SLIDE, 2 * k], cone[SLIDE, 2 * k + 1]) > MOVES * eps
@@ -297,15 +308,28 @@ def solve_slips(scene: Scene, count: int, r: int) -> float:
 
 
 @jitable
-def release_sticking(scene: Scene, t: float, y: F1) -> int:
-    """Let slip what is not held of what sticks, the way it is accelerated; return how many do."""
-    hold_implied(scene, t, y)
-    share_sticking(scene, t, y)
-    if sticking_part(scene) <= 1.0:
-        return 0
-    count, r = fill_cones(scene, t, y, most_capacity(scene))
-    fill_sliding(scene, t, y, count)
-    released, least, cone = 0, solve_slips(scene, count, r), scene.sweep.cone
+def solve_mechanism(scene: Scene, count: int, r: int, most: float) -> float:
+    """Find how what sticks would begin to slip, however slowly; return as `solve_slips` does.
+
+    Accelerations are known to a part of those of what presses most, and where shapes have just
+    touched beside that theirs are less. Which way the limit gives first the dual of shares tells,
+    whatever the size; inf where sliding there would rub more than pulls.
+    """
+    cone = scene.sweep.cone
+    for k in range(count // 2):
+        s = scene.equations.slot[int(cone[WHICH, k])]
+        cone[CAPACITY, k] = max(capacity(scene, s), least_capacity(scene, s, most))
+    _, eps = solve_cones(scene.sweep.share, count, r, cone, scene.sweep.mix, SHARED)
+    friction = 0.0
+    for k in range(count // 2):
+        friction += cone[SLIDING, k] * math.hypot(cone[SLIDE, 2 * k], cone[SLIDE, 2 * k + 1])
+    return MOVES * eps if friction < 1.0 else math.inf
+
+
+@jitable
+def let_go(scene: Scene, y: F1, count: int, least: float) -> int:
+    """Let slip the slots of so many rows that move faster than `least`; return how many do."""
+    released, cone = 0, scene.sweep.cone
     for k in range(count // 2):
         x, z = cone[SLIDE, 2 * k], cone[SLIDE, 2 * k + 1]
         if math.hypot(x, z) > least:
@@ -313,6 +337,22 @@ def release_sticking(scene: Scene, t: float, y: F1) -> int:
             v = slip_of(scene, y, s)
             let_slip(scene, s, -x, -z, 0.0, math.hypot(v[0], v[1]))
             released += 1
+    return released
+
+
+@jitable
+def release_sticking(scene: Scene, t: float, y: F1) -> int:
+    """Let slip what is not held of what sticks, the way it is accelerated; return how many do."""
+    hold_implied(scene, t, y)
+    share_sticking(scene, t, y)
+    if sticking_part(scene) <= 1.0:
+        return 0
+    most = most_capacity(scene)
+    count, r = fill_cones(scene, t, y, most)
+    fill_sliding(scene, t, y, count)
+    released = let_go(scene, y, count, solve_slips(scene, count, r, most))
+    if released == 0:
+        released = let_go(scene, y, count, solve_mechanism(scene, count, r, most))
     if released == 0:
         # sliding would rub more than sticking holds: it goes on to stick
         code = call_int(scene.world.hooks[Hook.EVALUATE], (scene, t, 0.0, y, scene.work.idle))
@@ -322,7 +362,16 @@ def release_sticking(scene: Scene, t: float, y: F1) -> int:
 
 
 @jitable
-def record_sticking(scene: Scene, t: float) -> None:
+def keep_play(scene: Scene, y: F1, s: int) -> None:
+    """Keep how slot s moves that was let go: as all that goes on to stick lets it from here on."""
+    kept, v = scene.state.memory[s], slip_of(scene, y, s)
+    play = math.hypot(v[0], v[1])
+    if play > kept[KEPT_PLAY]:
+        let_slip(scene, s, kept[KEPT_X], kept[KEPT_Y], 0.0, play)
+
+
+@jitable
+def record_sticking(scene: Scene, t: float, y: F1) -> None:
     """Append events of the slots that go on otherwise than before."""
     state, slot = scene.state, scene.equations.slot
     for e in range(first_of_slots(scene), len(slot), 2):
@@ -332,10 +381,14 @@ def record_sticking(scene: Scene, t: float) -> None:
             before[KEPT_MODE] = BEGUN
             kept[KEPT_X] = rest(scene) + settled(scene)
             continue
+        if kept[KEPT_MODE] == SLIP and kept[KEPT_SPEED] == 0.0:
+            keep_play(scene, y, s)
         if before[KEPT_MODE] == BEGUN:
             # rows of the step in which it began show what holds from there on
             for k in range(len(before)):
                 before[k] = kept[k]
+        if kept[KEPT_MODE] != before[KEPT_MODE]:
+            state.chattering[CHANGED] += 1.0
         turned = kept[KEPT_X] * before[KEPT_X] + kept[KEPT_Y] * before[KEPT_Y] < 0.0
         if kept[KEPT_MODE] == STICK and before[KEPT_MODE] == SLIP:
             record_event(scene, t, STICK_EVENT, s)
@@ -371,7 +424,7 @@ def serve_sticking(scene: Scene, what: int, t: float, y: F1) -> int:
     elif what == Sticking.RELEASE:
         return release_sticking(scene, t, y)
     elif what == Sticking.RECORD:
-        record_sticking(scene, t)
+        record_sticking(scene, t, y)
     elif what == Sticking.CHANGED:
         return changed_sticking(scene)
     elif what == Sticking.LOAD:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mbsim.arrays.codes import (
+    HELD_AT_PLACES,
     HELD_AXIS,
     HELD_NORMAL,
     HELD_POINT,
@@ -13,16 +14,17 @@ from mbsim.arrays.codes import (
 )
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
-from mbsim.core.arrays import F1
+from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
-from mbsim.core.rotation import add, norm, sub, vector
+from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_body, place_graphic
 from mbsim.dynamics.constraints.selection import sticks
 from mbsim.dynamics.contact.forces import contact_of, sides
 from mbsim.dynamics.contact.frames import tangent
+from mbsim.dynamics.contact.points import same_place
 from mbsim.dynamics.stiction.rigid_shares import first_of_slots
-from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT
+from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, axis
 
 #: Half of the time over which rates of a contact's place are found, over that in which the model's
 #: speed goes its length: truncation and rounding are about as large.
@@ -108,19 +110,42 @@ def holding_row(scene: Scene, s: int) -> int:
     """Return the candidate where slot s holds: its own, or what has taken over where that was.
 
     A corner that passes an edge is another row's from there on. What holds it holds on at its
-    place to the end of the step, which is where rows change hands.
+    place.
     """
-    points = scene.work.look[LOOKED_NOW]
-    k = s - scene.pairs.slot[scene.slots.pair[s]]
-    if points[k, AT_DEPTH] > 0.0:
-        return k
-    p, best = vector(scene.state.p[s]), k
-    least = norm(sub(vector(points[k, AT_POINT:]), p))
-    for q in range(scene.kinds.slots[scene.pairs.kind[scene.slots.pair[s]]]):
+    points, pair = scene.work.look[LOOKED_NOW], scene.slots.pair[s]
+    first = scene.pairs.slot[pair]
+    best, p, least = s - first, vector(scene.state.p[s]), same_place(scene, pair)
+    # a row that has no place has no depth either; one that has just left has one
+    if points[best, AT_DEPTH] != 0.0:
+        return best
+    for q in range(scene.kinds.slots[scene.pairs.kind[pair]]):
+        if points[q, AT_DEPTH] == 0.0 or scene.state.touching[first + q] == 1:
+            continue
         away = norm(sub(vector(points[q, AT_POINT:]), p))
-        if points[q, AT_DEPTH] > 0.0 and away < least:
+        if away < least:
             best, least = q, away
     return best
+
+
+@jitable
+def face_body(scene: Scene, s: int) -> int:
+    """Return the body whose face slot s is held along."""
+    return scene.graphics.body[scene.pairs.graphic_j[scene.slots.pair[s]]]
+
+
+@jitable
+def face_towards(scene: Scene, pair: int, n: V3) -> V3:
+    """Return the normal of the kernel's J that is next to n.
+
+    A corner behind an edge has the normal of edges in place of that of a face, off by the tilt of
+    both faces: held along each in turn it would be driven over the edge and back.
+    """
+    frame = scene.work.frames[scene.pairs.graphic_j[pair]]
+    best = axis(frame, 0)
+    for k in range(1, 3):
+        if abs(dot(axis(frame, k), n)) > abs(dot(best, n)):
+            best = axis(frame, k)
+    return best if dot(best, n) > 0.0 else scale(-1.0, best)
 
 
 @jitable
@@ -139,9 +164,11 @@ def fill_hold(scene: Scene, t: float, y: F1, s: int, moment: float) -> None:
             first, time = 0, moment
         else:
             last, time = 0, moment
-    n = vector(now[AT_NORMAL:])
+    n, level = vector(now[AT_NORMAL:]), scene.kinds.moves[scene.pairs.kind[scene.slots.pair[s]]]
     gi, gj = sides(scene, s)
     bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
+    if level == HELD_AT_PLACES:
+        n = face_towards(scene, scene.slots.pair[s], n)
     x = tangent(scene, t, y, s, contact_of(scene, s), gi, bi, bj, n)
     for i in range(3):
         row[HELD_POINT + i], row[HELD_NORMAL + i], row[HELD_AXIS + i] = (
@@ -155,6 +182,10 @@ def fill_hold(scene: Scene, t: float, y: F1, s: int, moment: float) -> None:
         row[NORMAL_RATE + i] = (
             points[last, k, AT_NORMAL + i] - points[first, k, AT_NORMAL + i]
         ) / time
+    if level == HELD_AT_PLACES:
+        turns = cross(vector(scene.work.w[face_body(scene, s)]), n)
+        for i in range(3):
+            row[NORMAL_RATE + i] = turns[i]
 
 
 @jitable

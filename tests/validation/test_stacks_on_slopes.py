@@ -1,0 +1,77 @@
+"""Stacks of boxes put down touching on a slope, STICTION: they come to rest, in few steps.
+
+All boxes fall together at first: the upper ones press each other by what they have been slowed, so
+that normal forces go from rounding to the weight, box by box.
+"""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from helpers.decks import contact, run_deck
+
+G = 9.81
+
+
+def stack(count, edge, mass, tilt, **law):
+    """Return boxes of one size on each other, just touching, and gravity that is tilted."""
+    inertia = mass * edge**2 / 6.0
+    text = f"""
+<Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10" body_id="1"/>
+<Post_Graphic id="100" type="Plane" rm_id="10"/>
+<Force_Gravity grav_x="{G * math.sin(tilt)!r}" grav_z="{-G * math.cos(tilt)!r}"/>"""
+    for k in range(count):
+        id = k + 2
+        text += f"""
+<Body_Rigid id="{id}" cg_id="{id}0" mass="{mass!r}" inertia_xx="{inertia!r}"
+  inertia_yy="{inertia!r}" inertia_zz="{inertia!r}"/>
+<Reference_Marker id="{id}0" body_id="{id}" pos_z="{(k + 0.5) * edge!r}"/>
+<Post_Graphic id="{id}00" type="BoxDefinedFromCenter" center_marker_id="{id}0"
+  length_x="{edge!r}" length_y="{edge!r}" length_z="{edge!r}"/>"""
+        text += contact(
+            i=100 * id,
+            j=100 * id - 100,
+            id=301 + k,
+            dmax=1e-5,
+            cff_type="STICTION",
+            mu_dynamic=law["mu_static"],
+            **law,
+        )
+    return text
+
+
+def rigid(k, e, c, mu):
+    """Return the law of a stack whose friction has no give."""
+    return {
+        "stiffness": k,
+        "exponent": e,
+        "damping": c,
+        "mu_static": mu,
+        "tangential_stiffness": "INFINITE",
+    }
+
+
+CASES = [
+    # corners of boxes that rock pass edges to and fro
+    ("RADAU5", 1e-4, (5, 0.3, 1.0, 0.1), (3431300.0, 1.5, 280.285, 0.203), 0.3363, 150),
+    # what has just touched asked for slip, and nothing was let go
+    ("AUTO", 1e-3, (6, 0.1, 1.0, 0.334), (39300000.0, 1.5, 645.687, 1.009), 0.146, 200),
+    ("GALPHA", 1e-4, (6, 0.1, 1.0, 0.321), (7503900.0, 1.3, 681.439, 0.926), 0.1383, 800),
+    # what was let go moved otherwise once the rest was held, and went back at once
+    ("GALPHA", 1e-4, (3, 0.1, 0.5, 0.116), (565600.0, 1.5, 88.885, 0.197), 0.5302, 700),
+    # one corner was counted twice in every other step
+    ("AUTO", 1e-3, (6, 0.2, 1.0, 0.33), (180700.0, 1.0, 4.251, 0.697), 0.05, 600),
+    # a corner lifts while it sticks
+    ("RADAU5", 1e-6, (3, 0.1, 1.0, 0.298), (22047200.0, 1.1, 499.024, 0.911), 0.01, 600),
+    ("AUTO", 1e-5, (3, 0.2, 1.0, 0.2), (1e5, 1.0, 100.0, 0.5), 0.5, 250),
+]
+
+
+@pytest.mark.parametrize(("method", "tol", "boxes", "law", "end", "steps"), CASES)
+def test_a_stack_on_a_slope_needs_few_steps(method, tol, boxes, law, end, steps, tmp_path):
+    model = stack(*boxes, **rigid(*law))
+    results = run_deck(tmp_path, model, end, end / 50.0, integrator=method, tol=tol)
+    assert results["time"][-1] == pytest.approx(end)
+    assert results.stats["steps"] < steps
