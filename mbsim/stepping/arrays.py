@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mbsim.core import tags
-from mbsim.core.arrays import F1, F2, F3, F4, I1, I2
+from mbsim.core.arrays import F1, F2, F3, I1, I2
 
 #: Speeds at which a coefficient of friction is tabled, and the step of their logarithm's base 2.
 SPEEDS = 64
@@ -52,6 +52,13 @@ PLAN_NUMBERS = 9
 # is from that of two halves; 1 where velocities jump in it or in either of two halves
 RESIDUAL, STEP_LENGTH, FASTEST, CLOSED, END_OFF, HIT = range(6)
 TALLY_NUMBERS = 6
+# entries of `Points.given`: axes n, x, z; a x axis for I's arm a, then J's; I^-1 of these, as each
+# body's inertia is; inverse masses of I and J; u by r, a symmetric matrix; its inverse, row by row
+# from the diagonal on, 0 where it has none; 1/W_nn, and W_nx, W_nz over W_nn; of x, z what of W is
+# left where n is held
+AXES, TURN, SPIN, LIGHT = 0, 9, 27, 45
+W_NN, W_NX, W_NZ, W_XX, W_XZ, W_ZZ, STOPS, ALONG, SCHUR = 47, 48, 49, 50, 51, 52, 53, 59, 62
+GIVEN = 65
 # entries of `Tally.load`: of the step tried last, its first half and its second; 1 where friction
 # yields at the begin of the step at hand, as far as is known; else how long after that, as the last
 # step saw it
@@ -94,6 +101,7 @@ class Motion(NamedTuple):
     free: F2  # (nb + 1, 6) at its end, were there no contacts
     v: F2  # (nb + 1, 6) with them
     shift: F2  # (nb + 1, 6) displacement over the step's length
+    changed: I1  # (nb + 1,) the sweep that changed a body's velocity last by what counts
     part: F1  # (nb + 1,) of `before` in that, the rest being v's
     touch: F1  # (nb + 1,) part of the step at which a body first meets something that turns it
     flies: F1  # (nb + 1,) whether it flies before that and behind, see `displacements`
@@ -123,16 +131,14 @@ class Points(NamedTuple):
     arm: F3  # (m, 2, 3) from the bodies' cg, when the point touches
     normal: F2  # (m, 3)
     tangent: F2  # (m, 3)
-    H: F4  # (m, 2, 3, 6) velocity along (n, x, y) by those of the bodies
-    answer: F4  # (m, 2, 3, 6) velocities of the bodies by each of r, where joints hold neither
+    given: F2  # (m, GIVEN) what the solver reads of the point, see above
     wide: I1  # (m,) else first row of `moved`, -1 where they do not
     many: I1  # (m,) its rows there
     moved: I1  # (wide rows,) bodies that r moves
     moves: F3  # (wide rows, 6, 3) their velocities by r
-    W: F3  # (m, 3, 3) u by r
-    stops: F3  # (m, 3, 3) its inverse, 0 where it has none
     mu: F1  # (m,)
     holds: F1  # (m,) mu as it is at the step's begin
+    slides: F1  # (m,) s of `one_point.slip_of` as found last, 0 for none
     ahead: F1  # (m,) u_n + ahead >= 0 where the point closes
     part: F1  # (m,) of the step before an impact with restitution
     closing: F1  # (m,) u_n before the step
@@ -193,6 +199,7 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int]) -
         free=numbers(nb + 1, 6),
         v=numbers(nb + 1, 6),
         shift=numbers(nb + 1, 6),
+        changed=whole(nb + 1),
         part=numbers(nb + 1),
         touch=numbers(nb + 1),
         flies=numbers(nb + 1),
@@ -218,16 +225,14 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int]) -
         arm=numbers(m, 2, 3),
         normal=numbers(m, 3),
         tangent=numbers(m, 3),
-        H=numbers(m, 2, 3, 6),
-        answer=numbers(m, 2, 3, 6),
+        given=numbers(m, GIVEN),
         wide=whole(m),
         many=whole(m),
         moved=whole(wide),
         moves=numbers(wide, 6, 3),
-        W=numbers(m, 3, 3),
-        stops=numbers(m, 3, 3),
         mu=numbers(m),
         holds=numbers(m),
+        slides=numbers(m),
         ahead=numbers(m),
         part=numbers(m),
         closing=numbers(m),

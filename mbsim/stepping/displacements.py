@@ -20,7 +20,7 @@ from mbsim.core.rotation import matrix_from_quaternion, norm, unrotate, vector
 from mbsim.dynamics.bodies.configuration import turn
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.stepping.arrays import LEFT_SPEED, POINTS, STEP_LENGTH, Stepping
-from mbsim.stepping.solver import velocity_of
+from mbsim.stepping.one_point import velocity_of
 
 #: Of `Points.part` and `Motion.part`: no impact with restitution.
 NO_IMPACT = 2.0
@@ -59,9 +59,9 @@ def start_parts(S: Stepping, count: int, h: float, slop: float, ground: int) -> 
         part, touch, flies = P.part[k], P.part[k], FLIES if P.ahead[k] < 0.0 else LANDS
         if part == NO_IMPACT:
             flies = PRESSED
-            after = velocity_of(P.H, k, 0, M.v, i, j)
+            after = velocity_of(P, k, 0, M.v)
             if 0.5 * h * abs(after - P.closing[k]) > slop:
-                free = velocity_of(P.H, k, 0, M.free, i, j)
+                free = velocity_of(P, k, 0, M.free)
                 part, touch = 0.0, meets_at(P.gap[k], h, P.closing[k], free)
         for b in (i, j):
             M.part[b], M.touch[b] = min(M.part[b], part), min(M.touch[b], touch)

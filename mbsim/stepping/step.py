@@ -58,6 +58,7 @@ from mbsim.stepping.arrays import (
     SLOWEST,
     STEP_LENGTH,
     UNSOLVED,
+    W_NN,
     Stepping,
 )
 from mbsim.stepping.displacements import (
@@ -78,14 +79,10 @@ from mbsim.stepping.friction import (
     let_yield,
 )
 from mbsim.stepping.kept import index_kept, recall
+from mbsim.stepping.one_point import apply, velocity_of
 from mbsim.stepping.pairs import find_missed, find_points
 from mbsim.stepping.points import fill_point, fill_reach, way_at
-from mbsim.stepping.solver import (
-    apply,
-    project_positions,
-    solve_points,
-    velocity_of,
-)
+from mbsim.stepping.solver import project_positions, solve_points
 
 #: Newton iterations for the spin of a body at most.
 MOST_SPINS = 12
@@ -244,7 +241,7 @@ def look_ahead(S: Stepping, k: int, h: float) -> None:
     if P.was[k] >= 0 and 0.0 < gap <= S.plan.number[SLOP]:
         # it lies on: to follow what does not count would keep all that rests in motion
         gap = 0.0
-    free = velocity_of(P.H, k, 0, M.free, P.body[k, 0], P.body[k, 1])
+    free = velocity_of(P, k, 0, M.free)
     P.ahead[k] = max(gap, 0.0) / h
     P.part[k] = NO_IMPACT
     mean = 0.5 * (before + free)
@@ -277,10 +274,9 @@ def postpone(S: Stepping, count: int, h: float) -> bool:
         if P.gap[k] <= S.plan.number[SLOP]:
             continue
         # without its impulse
-        i, j = P.body[k, 0], P.body[k, 1]
-        u = velocity_of(P.H, k, 0, M.v, i, j)
+        u = velocity_of(P, k, 0, M.v)
         for a in range(3):
-            u -= P.W[k, 0, a] * P.r[k, a]
+            u -= P.given[k, W_NN + a] * P.r[k, a]
         if u >= -max(rule[SLOWEST], NOISE * left_of(S, h)):
             continue
         apply(P, k, M.v, (-P.r[k, 0], -P.r[k, 1], -P.r[k, 2]))
@@ -304,8 +300,7 @@ def prepare_points(scene: Scene, S: Stepping, h: float) -> int:
         begin += P.many[k] if P.wide[k] >= 0 else 0
     recall(S, h)
     for k in range(count):
-        i, j = P.body[k, 0], P.body[k, 1]
-        x, z = velocity_of(P.H, k, 1, M.before, i, j), velocity_of(P.H, k, 2, M.before, i, j)
+        x, z = velocity_of(P, k, 1, M.before), velocity_of(P, k, 2, M.before)
         slip, row = math.sqrt(x * x + z * z), P.was[k]
         if row >= 0 and slip <= NOISE * left_of(S, h):
             # what stuck moves by what the solver left of it
@@ -336,10 +331,9 @@ def add_losses(scene: Scene, S: Stepping, new: F1) -> None:
     for k in range(S.tally.count[POINTS]):
         if P.r[k, 0] == 0.0:
             continue
-        i, j, c = P.body[k, 0], P.body[k, 1], P.contact[k]
-        across = 0.0
+        c, across = P.contact[k], 0.0
         for a in range(3):
-            u = velocity_of(P.H, k, a, M.before, i, j) + velocity_of(P.H, k, a, M.v, i, j)
+            u = velocity_of(P, k, a, M.before) + velocity_of(P, k, a, M.v)
             new[first + c] -= 0.5 * P.r[k, a] * u
             across += 0.5 * P.r[k, a] * u if a > 0 else 0.0
         if scene.audit.friction_at[c] >= 0:
