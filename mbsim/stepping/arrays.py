@@ -44,14 +44,17 @@ KEPT_COLUMNS = 26
 # and changes of position do not count; what the solver may leave of a velocity, times h; 1 where
 # some kind of pair is not near; how fast positions are projected, see `solver.project_positions`;
 # what may be left of a velocity at most, however short a step; and part of a step's jumps that may;
-# how near to where friction yields a step is to end; the model's own time L/V
+# how near to where friction yields a step is to end; the model's own time L/V; how far closing and
+# slipping may go in a step and are none; 1 where bodies at rest may sleep
 FIXED, SLOP, LEFT, SOME_AHEAD, PUSH_SPEED, LEFT_SPEED, LEFT_PART, NEAR, OWN_TIME = range(9)
-PLAN_NUMBERS = 9
+NOISE, MAY_SLEEP = 9, 10
+PLAN_NUMBERS = 11
 # entries of `Tally.number`, of the last step tried: what the solver left, as a velocity; its
 # length; the contact that closed fastest in it, and by how much within its length; how far its end
-# is from that of two halves; 1 where velocities jump in it or in either of two halves
-RESIDUAL, STEP_LENGTH, FASTEST, CLOSED, END_OFF, HIT = range(6)
-TALLY_NUMBERS = 6
+# is from that of two halves; 1 where velocities jump in it or in either of two halves; the energy
+# that it leaves open by the way it moves bodies on (`energy.left_open`)
+RESIDUAL, STEP_LENGTH, FASTEST, CLOSED, END_OFF, HIT, LEFT_OPEN = range(7)
+TALLY_NUMBERS = 7
 # entries of `Points.given`: axes n, x, z; a x axis for I's arm a, then J's; I^-1 of these, as each
 # body's inertia is; inverse masses of I and J; u by r, a symmetric matrix; its inverse, row by row
 # from the diagonal on, 0 where it has none; 1/W_nn, and W_nx, W_nz over W_nn; of x, z what of W is
@@ -104,6 +107,7 @@ class Motion(NamedTuple):
     changed: I1  # (nb + 1,) the sweep that changed a body's velocity last by what counts
     part: F1  # (nb + 1,) of `before` in that, the rest being v's
     touch: F1  # (nb + 1,) part of the step at which a body first meets something that turns it
+    spins: F1  # (nb,) kinetic energy of a spin as impulses make it, see `energy`
     flies: F1  # (nb + 1,) whether it flies before that and behind, see `displacements`
     reach: F1  # (ng,) how far a graphic may come in the step
     went: F1  # (ng,) how far it goes by what impulses give
@@ -111,6 +115,7 @@ class Motion(NamedTuple):
     way: F2  # (2, 6) velocities of the bodies of a pair that is moved ahead
     frames: F2  # (2, 12) of its graphics at the step's begin
     taken: I1  # (pairs + 1,) the try of a step in which a pair has points by that; last: this one
+    measured: I1  # (pairs,) list of near pairs in which its rows were measured, -1 for none
     impulse: F1  # (ny,) impulses on bodies, then what they change of velocities
     middle: F1  # (ny,) state in the midst of a step
     half: F2  # (2, ny) states of a step's two halves, where it is compared with them
@@ -166,6 +171,7 @@ class Tally(NamedTuple):
     number: F1  # (TALLY_NUMBERS,)
     count: I1  # type: ignore[assignment]  # (TALLY_COUNTS,)
     load: F2  # (nc, LOADS) friction of pairs that stick over the most it may be
+    grounded: I1  # (groups,) 1 where ground pressed on a group of bodies since the last sample
     deepest: F1  # (nc,) depth of each contact at the begins of the parts of the step tried last
 
 
@@ -180,12 +186,13 @@ class Stepping(NamedTuple):
     tally: Tally
 
 
-def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int]) -> Stepping:
+def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int, int]) -> Stepping:
     """Return empty arrays.
 
-    `sizes` are the numbers of bodies, graphics, numbers of y, contact points, pairs, wide rows.
+    `sizes` are the numbers of bodies, graphics, numbers of y, contact points, pairs, wide rows,
+    groups of bodies.
     """
-    nb, ng, ny, m, pairs, wide = sizes
+    nb, ng, ny, m, pairs, wide, groups = sizes
 
     def whole(*shape: int) -> np.ndarray:
         return np.zeros(shape, dtype=np.int64)
@@ -202,6 +209,7 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int]) -
         changed=whole(nb + 1),
         part=numbers(nb + 1),
         touch=numbers(nb + 1),
+        spins=numbers(nb),
         flies=numbers(nb + 1),
         reach=numbers(ng),
         went=numbers(ng),
@@ -209,6 +217,7 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int]) -
         way=numbers(2, 6),
         frames=numbers(2, 12),
         taken=whole(pairs + 1),
+        measured=whole(pairs) - 1,
         impulse=numbers(ny),
         middle=numbers(ny),
         half=numbers(2, ny),
@@ -245,6 +254,8 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int]) -
     room = 1 << max(4, int(4 * m - 1).bit_length())
     kept = Kept(whole(1), whole(m), np.zeros((m, KEPT_COLUMNS)), whole(room))
     nc = len(rules.number)
-    tally = Tally(np.zeros(TALLY_NUMBERS), whole(TALLY_COUNTS), numbers(nc, LOADS), numbers(nc))
+    tally = Tally(
+        np.zeros(TALLY_NUMBERS), whole(TALLY_COUNTS), numbers(nc, LOADS), whole(groups), numbers(nc)
+    )
     tally.load[:, DUE] = 1.0
     return Stepping(rules, plan, motion, points, kept, tally)

@@ -14,6 +14,7 @@ from mbsim.stepping.arrays import (
     LEFT,
     LEFT_SPEED,
     NEAR,
+    NOISE,
     OF_FIRST,
     OF_SECOND,
     OF_WHOLE,
@@ -27,9 +28,9 @@ from mbsim.stepping.arrays import (
 )
 from mbsim.stepping.one_point import velocity_of
 
-#: Closing speeds have no restitution, and slips are none, up to so many times what the solver may
-#: leave of a velocity.
-NOISE = 30.0
+#: Closing and slipping are none up to so many times what the solver may leave of a velocity at
+#: most, however short a step.
+NOISE_OF_SPEED = 30.0
 #: Changes of mu that do not count.
 YIELDS = 1e-3
 #: A load as large as it may be.
@@ -50,6 +51,13 @@ def left_of(S: Stepping, h: float) -> float:
     velocity behind an impact in a step that is very short.
     """
     return min(S.plan.number[LEFT] / h, S.plan.number[LEFT_SPEED])
+
+
+@jitable
+def noise_of(S: Stepping, h: float) -> float:
+    """Return the speed up to which closing and slipping in a step h are none."""
+    number = S.plan.number
+    return min(number[NOISE] / h, NOISE_OF_SPEED * number[LEFT_SPEED])
 
 
 @jitable
@@ -83,7 +91,7 @@ def load_of(S: Stepping, begin: int, end: int) -> float:
 
 
 @jitable
-def let_yield(S: Stepping, count: int, allowed: float) -> bool:
+def let_yield(S: Stepping, count: int, noise: float) -> bool:
     """Lower mu where what stuck slips, to that of its slip; return whether that changed much.
 
     A step in which friction yields is then one that slides from its begin: steps by error end where
@@ -102,7 +110,7 @@ def let_yield(S: Stepping, count: int, allowed: float) -> bool:
             slip = math.sqrt(x * x + z * z)
             if load < 0.0:
                 load = load_of(S, begin, end)
-            if load < SATURATED and slip <= NOISE * allowed:
+            if load < SATURATED and slip <= noise:
                 continue
             mu = coefficient(S, P.contact[k], slip)
             if mu < (1.0 - YIELDS) * P.mu[k]:

@@ -139,7 +139,7 @@ def recall(S: Stepping, h: float) -> None:
         begin = end
     for k in range(count):
         row = P.was[k]
-        P.r[k, 0] = P.r[k, 1] = P.r[k, 2] = 0.0
+        P.r[k, 0] = P.r[k, 1] = P.r[k, 2] = P.slides[k] = 0.0
         if row < 0:
             continue
         f = vector(kept.table[row, KEPT_FORCE:])

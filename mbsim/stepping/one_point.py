@@ -36,9 +36,13 @@ from mbsim.stepping.arrays import (
 
 #: A determinant is none below this part of the product of a matrix' diagonal.
 SINGULAR = 1e-12
+#: The same of what of W is left across n.
+FLAT = 1e-14
+#: A guess of s that is so many times off is none.
+FAR = 3.0
 #: Newton iterations for the slip of a point at most, and where its friction is on the cone: the
 #: next visit begins with the iteration's last step.
-MOST_SLIPS, ON_CONE = 60, 1e-9
+MOST_SLIPS, ON_CONE = 60, 1e-12
 
 
 @jitable
@@ -157,6 +161,23 @@ def fill_inverse(row: F1) -> None:
 
 
 @jitable
+def sticks_beside(
+    row: F1, height: float, c: tuple[float, float]
+) -> tuple[bool, float, float, float]:
+    """Return whether friction (x, z) brings to rest what W as a whole has no inverse for, and r_N.
+
+    That is asked where W has none.
+    """
+    s11, s12, s22 = row[SCHUR], row[SCHUR + 1], row[SCHUR + 2]
+    determinant = s11 * s22 - s12 * s12
+    if row[STOPS] > 0.0 or not determinant > FLAT * abs(s11 * s22):
+        return False, 0.0, 0.0, 0.0
+    x = (s12 * c[1] - s22 * c[0]) / determinant
+    z = (s12 * c[0] - s11 * c[1]) / determinant
+    return True, x, z, height - row[ALONG + 1] * x - row[ALONG + 2] * z
+
+
+@jitable
 def slip_of(row: F1, height: float, c: tuple[float, float], mu: float, s: float) -> V3:
     """Return friction (x, z) of a point that slips, and s for its next visit.
 
@@ -167,8 +188,9 @@ def slip_of(row: F1, height: float, c: tuple[float, float], mu: float, s: float)
     s11, s12, s22 = row[SCHUR], row[SCHUR + 1], row[SCHUR + 2]
     size = math.sqrt(c[0] * c[0] + c[1] * c[1])
     low, high = 0.0, -1.0
-    if s <= 0.0:
-        s = size / (mu * height) - 0.5 * (s11 + s22)
+    usual = size / (mu * height) - 0.5 * (s11 + s22)
+    if not FAR * s >= usual or not s <= FAR * usual:
+        s = usual
         if s <= 0.0:
             s = 1e-3 * (abs(s11) + abs(s22)) + 1e-300
     x, z = 0.0, 0.0
@@ -233,7 +255,10 @@ def solve_point(p: Points, v: F2, k: int) -> float:
             bz = uz - (wnz * rn + wxz * rx + wzz * rz)
             c = (bx + wnx * height, bz + wnz * height)
             sn, sx, sz = height, 0.0, 0.0
-            if mu > 0.0 and (c[0] != 0.0 or c[1] != 0.0):
+            some, x, z, n = sticks_beside(row, height, c)
+            if some and n >= 0.0 and x * x + z * z <= mu * mu * n * n:
+                sn, sx, sz = n, x, z
+            elif mu > 0.0 and (c[0] != 0.0 or c[1] != 0.0):
                 x, z, p.slides[k] = slip_of(row, height, c, mu, p.slides[k])
                 part = 1.0 / math.sqrt(x * x + z * z)
                 x, z = part * x, part * z

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import ACTIVE, NARROWPHASE, SKIPPED, WANTED
+from mbsim.arrays.codes import ACTIVE, LISTINGS, NARROWPHASE, SKIPPED, WANTED
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
@@ -21,6 +21,17 @@ from mbsim.dynamics.contact.detection import measure_pair
 from mbsim.stepping.ahead import look_ahead_of, meets_after_all
 from mbsim.stepping.arrays import POINTS, SOME_AHEAD, Stepping
 from mbsim.stepping.points import deepest_of, fill_reach, take_rows
+
+
+@jitable
+def lies_still(scene: Scene, S: Stepping, pair: int) -> bool:
+    """Return whether a pair's shapes did not move since its rows were measured, in this list."""
+    pairs, travel = scene.pairs, scene.work.travel
+    if S.motion.measured[pair] != scene.log.counters[LISTINGS]:
+        return False
+    since = pairs.gap[pair] - pairs.left[pair]
+    since += travel[pairs.graphic_i[pair]] + travel[pairs.graphic_j[pair]]
+    return since == 0.0
 
 
 @jitable
@@ -46,15 +57,22 @@ def find_points(scene: Scene, S: Stepping, y: F1, h: float, committed: bool) -> 
         reach = S.motion.reach[gi] + S.motion.reach[gj]
         if pairs.left[pair] - work.travel[gi] - work.travel[gj] > reach:
             continue
-        measured += 1
-        measure_pair(scene, pair)
-        depth = deepest_of(scene, S, pair)
-        if committed:
-            pairs.gap[pair] = pairs.left[pair] = -depth
-        if S.plan.near[pairs.kind[pair]] == 1:
+        near = S.plan.near[pairs.kind[pair]] == 1
+        if near and lies_still(scene, S, pair):
             room = take_rows(scene, S, y, pair, (-math.inf, reach))
         else:
-            room = look_ahead_of(scene, S, y, pair, h, depth)
+            measured += 1
+            measure_pair(scene, pair)
+            depth = deepest_of(scene, S, pair)
+            M.measured[pair] = -1
+            if committed:
+                pairs.gap[pair] = pairs.left[pair] = -depth
+                if near and work.beyond[scene.kinds.contact[pairs.kind[pair]]] == 0:
+                    M.measured[pair] = log.counters[LISTINGS]
+            if near:
+                room = take_rows(scene, S, y, pair, (-math.inf, reach))
+            else:
+                room = look_ahead_of(scene, S, y, pair, h, depth)
         if not room:
             return Code.NO_ROOM
     log.counters[NARROWPHASE] += measured

@@ -239,6 +239,5 @@ def fill_point(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
         answer_of(P, k, 2, 2),
     )
     fill_inverse(row)
-    P.slides[k] = 0.0
     P.closing[k] = velocity_of(P, k, 0, S.motion.before)
     return True

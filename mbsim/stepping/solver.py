@@ -32,8 +32,10 @@ LOOKS = 8
 MOST_LEFT = 10.0
 #: How often the points of a pair are solved in one sweep at most.
 MOST_ROUNDS = 5
+#: A single point may be left so many times worse than the mean of them.
+WORST = 5.0
 #: A velocity that changes by less than this part of what may be left asks no other pair.
-STILL = 0.1
+STILL = 0.25
 #: Points up to which Newton's method finishes: of large piles a step's factors cost more than
 #: sweeps bring, and warm starts go on from step to step.
 NEWTON_POINTS = 300
@@ -42,14 +44,27 @@ NEWTONS, SHARPEST = 40, 1e-13
 
 
 @jitable
-def solve_pair(p: Points, v: F2, begin: int, end: int) -> float:
-    """Solve points of one pair in turn; return the largest change over what may be left."""
-    largest = 0.0
+def solve_pair(p: Points, v: F2, begin: int, end: int) -> tuple[float, float]:
+    """Solve points of one pair in turn.
+
+    Return the largest change over what may be left, and the sum of their squares.
+    """
+    largest, square = 0.0, 0.0
     for k in range(begin, end):
         change = solve_point(p, v, k) * p.counts[k]
+        square += change * change
         if not change <= largest:
             largest = change
-    return largest
+    return largest, square
+
+
+@jitable
+def pressing(p: Points, count: int) -> int:
+    """Return how many points press."""
+    some = 0
+    for k in range(count):
+        some += 1 if p.r[k, 0] > 0.0 else 0
+    return some
 
 
 @jitable
@@ -73,26 +88,28 @@ def change_all(changed: I1, number: int) -> None:
 
 
 @jitable
-def sweep(p: Points, M: Motion, count: int, number: int) -> float:
+def sweep(p: Points, M: Motion, count: int, number: int) -> tuple[float, float]:
     """Go through the pairs whose bodies sweep `number - 1` changed, or this one before.
 
-    Return the largest change of a velocity over what may be left. What changes by less than
-    `STILL` of that wakes nobody: a sweep of all pairs has the last word (`sweep_on`). Points of one
-    pair are solved a few times in turn: they bear on each other most, as corners of a face do.
+    Return the largest change of a velocity over what may be left, and the square mean over points
+    that press. What changes by less than `STILL` of that wakes nobody: a sweep of all pairs has the
+    last word (`sweep_on`). Points of one pair are solved a few times in turn: they bear on each
+    other most, as corners of a face do.
     """
-    largest, begin, changed = 0.0, 0, M.changed
+    largest, square, begin, changed = 0.0, 0.0, 0, M.changed
     while begin < count:
         end = begin + 1
         while end < count and p.key[end] == p.key[begin]:
             end += 1
         i, j = p.body[begin, 0], p.body[begin, 1]
         if changed[i] >= number - 1 or changed[j] >= number - 1:
-            first = solve_pair(p, M.v, begin, end)
+            first, more = solve_pair(p, M.v, begin, end)
+            square += more
             if not first <= largest:
                 largest = first
             rounds, left = 1, first
             while end > begin + 1 and 1.0 < left < math.inf and rounds < MOST_ROUNDS:
-                left = solve_pair(p, M.v, begin, end)
+                left = solve_pair(p, M.v, begin, end)[0]
                 rounds += 1
             if not first <= STILL:
                 for k in range(begin, end):
@@ -100,7 +117,7 @@ def sweep(p: Points, M: Motion, count: int, number: int) -> float:
                     if p.wide[k] < 0:
                         break
         begin = end
-    return largest
+    return largest, math.sqrt(square / max(pressing(p, count), 1))
 
 
 @jitable
@@ -162,17 +179,18 @@ def go_on(p: Points, M: Motion, count: int, part: float, number: int) -> None:
 @jitable
 def sweep_on(
     p: Points, M: Motion, count: int, allowed: tuple[float, float], most: int
-) -> tuple[float, int]:
-    """Improve r and v of `count` points; return what a sweep still changes, sweeps.
+) -> tuple[float, int, bool]:
+    """Improve r and v of `count` points; return what a sweep still changes, sweeps, if solved.
 
     That is of a velocity, over what may be left of it: `allowed` and a part of jumps. Sweeps end
-    where one of all pairs changes less than 1, or with `most`. Between them
+    where one of all pairs changes less than 1 in the square mean over what presses, and nowhere
+    more than `WORST`; or with `most`. Between them
     impulses go on along the way of the sweeps before, as conjugate gradients do, which is dropped
     where a sweep changes more than the last one.
     Source: M. Silcowitz, S. Niebe, K. Erleben, A nonsmooth nonlinear conjugate gradient method for
     interactive contact force problems, The Visual Computer 26 (2010) 893.
     """
-    left, before, sweeps, whole = 0.0, 0.0, 0, True
+    left, before, sweeps, whole, solved = 0.0, 0.0, 0, True, True
     for k in range(count):
         p.counts[k] = 1.0 / allowed[0]
         for a in range(3):
@@ -180,12 +198,13 @@ def sweep_on(
     change_all(M.changed, 0)
     while sweeps < most:
         sweeps += 1
-        left = sweep(p, M, count, sweeps)
+        left, mean = sweep(p, M, count, sweeps)
         if sweeps % LOOKS == 1 and left > 1.0:
             let_jumps_count(p, M, count, allowed[0], allowed[1])
-        if (left <= 1.0 and whole) or sweeps == most or not math.isfinite(left):
+        solved = left <= 1.0 or (left <= WORST and mean <= 1.0)
+        if (solved and whole) or sweeps == most or not math.isfinite(left):
             break
-        whole = left <= 1.0 or sweeps == most - 1
+        whole = solved or sweeps == most - 1
         square = gradient(p, count)
         part = -1.0
         if sweeps == 1:
@@ -196,7 +215,7 @@ def sweep_on(
         before = square
         if whole:
             change_all(M.changed, sweeps)
-    return left, sweeps
+    return left, sweeps, solved
 
 
 @jitable
@@ -252,27 +271,27 @@ def some_wide(p: Points, count: int) -> bool:
 @jitable
 def solve_points(
     p: Points, M: Motion, ground: int, count: int, allowed: tuple[float, float]
-) -> tuple[float, int, int]:
-    """Solve `count` points; return what a sweep still changes, sweeps and Newtons: `sweep_on`.
+) -> tuple[float, int, int, bool]:
+    """Solve `count` points; return what a sweep still changes, sweeps, Newtons, if it is solved.
 
-    r and v are as a guess says: r of the last step, v with that. A few sweeps do where little
-    changed; Newton's method does what they leave, and sweeps what it leaves.
+    See `sweep_on`. r and v are as a guess says: r of the last step, v with that. A few sweeps do
+    where little changed; Newton's method does what they leave, and sweeps what it leaves.
     """
-    left, sweeps = sweep_on(p, M, count, allowed, FEW_SWEEPS)
-    if left <= 1.0:
-        return left, sweeps, 0
+    left, sweeps, solved = sweep_on(p, M, count, allowed, FEW_SWEEPS)
+    if solved:
+        return left, sweeps, 0, solved
     newtons = 0
     if not math.isfinite(left):
         begin_anew(p, M, count)
     elif count <= NEWTON_POINTS and not some_wide(p, count):
         newtons = finish(p, M, ground, count, allowed[0])
-    left, more = sweep_on(p, M, count, allowed, MOST_SWEEPS)
+    left, more, solved = sweep_on(p, M, count, allowed, MOST_SWEEPS)
     if not math.isfinite(left):
         begin_anew(p, M, count)
         change_all(M.changed, 0)
         for number in range(1, FEW_SWEEPS + 1):
-            left = sweep(p, M, count, number)
-    return left, sweeps + more, newtons
+            left = sweep(p, M, count, number)[0]
+    return left, sweeps + more, newtons, solved
 
 
 @jitable

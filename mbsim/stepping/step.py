@@ -69,14 +69,15 @@ from mbsim.stepping.displacements import (
     spread_parts,
     velocities_jump,
 )
+from mbsim.stepping.energy import keep_left, left_by_forces, left_by_spins
 from mbsim.stepping.friction import (
-    NOISE,
     coefficient,
     keep_loads,
     left_near_yield,
     left_of,
     let_stick,
     let_yield,
+    noise_of,
 )
 from mbsim.stepping.kept import index_kept, recall
 from mbsim.stepping.one_point import apply, velocity_of
@@ -250,7 +251,7 @@ def look_ahead(S: Stepping, k: int, h: float) -> None:
         P.ahead[k] = max(P.ahead[k], -free)
         return
     part = meets_at(gap, h, before, free)
-    comes, slowest = before + part * (free - before), max(rule[SLOWEST], NOISE * left_of(S, h))
+    comes, slowest = before + part * (free - before), max(rule[SLOWEST], noise_of(S, h))
     if comes >= -slowest or (gap <= S.plan.number[SLOP] and before >= -slowest):
         return
     leaves = -rule[RESTITUTION] * comes + (1.0 - part) * (free - before)
@@ -277,7 +278,7 @@ def postpone(S: Stepping, count: int, h: float) -> bool:
         u = velocity_of(P, k, 0, M.v)
         for a in range(3):
             u -= P.given[k, W_NN + a] * P.r[k, a]
-        if u >= -max(rule[SLOWEST], NOISE * left_of(S, h)):
+        if u >= -max(rule[SLOWEST], noise_of(S, h)):
             continue
         apply(P, k, M.v, (-P.r[k, 0], -P.r[k, 1], -P.r[k, 2]))
         P.r[k, 0] = P.r[k, 1] = P.r[k, 2] = 0.0
@@ -302,7 +303,7 @@ def prepare_points(scene: Scene, S: Stepping, h: float) -> int:
     for k in range(count):
         x, z = velocity_of(P, k, 1, M.before), velocity_of(P, k, 2, M.before)
         slip, row = math.sqrt(x * x + z * z), P.was[k]
-        if row >= 0 and slip <= NOISE * left_of(S, h):
+        if row >= 0 and slip <= noise_of(S, h):
             # what stuck moves by what the solver left of it
             slip = 0.0 if S.kept.table[row, KEPT_STICKS] == 1.0 else slip
         P.holds[k] = coefficient(S, P.contact[k], slip)
@@ -324,6 +325,16 @@ def start_impulses(S: Stepping, h: float, ground: int) -> None:
 
 
 @jitable
+def note_grounded(scene: Scene, S: Stepping, i: int, j: int) -> None:
+    """Note that ground presses on the group of a body, where one of two bodies is ground."""
+    nb, group = len(scene.bodies.mass), scene.scales.group
+    if i == nb and j < nb:
+        S.tally.grounded[group[j]] = 1
+    elif j == nb and i < nb:
+        S.tally.grounded[group[i]] = 1
+
+
+@jitable
 def add_losses(scene: Scene, S: Stepping, new: F1) -> None:
     """Add what contacts took: an impulse does its work at the mean of velocities."""
     P, M = S.points, S.motion
@@ -332,8 +343,13 @@ def add_losses(scene: Scene, S: Stepping, new: F1) -> None:
         if P.r[k, 0] == 0.0:
             continue
         c, across = P.contact[k], 0.0
+        note_grounded(scene, S, P.body[k, 0], P.body[k, 1])
         for a in range(3):
-            u = velocity_of(P, k, a, M.before) + velocity_of(P, k, a, M.v)
+            before = velocity_of(P, k, a, M.before)
+            u = before + velocity_of(P, k, a, M.v)
+            if P.part[k] != NO_IMPACT:
+                # velocities are those right before the impact and behind it
+                u += (2.0 * P.part[k] - 1.0) * (velocity_of(P, k, a, M.free) - before)
             new[first + c] -= 0.5 * P.r[k, a] * u
             across += 0.5 * P.r[k, a] * u if a > 0 else 0.0
         if scene.audit.friction_at[c] >= 0:
@@ -348,11 +364,11 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
     start_impulses(S, h, nb)
     slop = S.plan.number[SLOP]
     allowed = left_of(S, h)
-    left, sweeps, part = 0.0, 0, S.plan.number[LEFT_PART]
+    left, sweeps, part, solved = 0.0, 0, S.plan.number[LEFT_PART], True
     for k in range(count):
         P.mu[k] = P.holds[k]
     for _ in range(MOST_YIELDS if count > 0 else 0):
-        left, more, newtons = solve_points(P, M, nb, count, (allowed, part))
+        left, more, newtons, solved = solve_points(P, M, nb, count, (allowed, part))
         sweeps += more
         tally.count[NEWTONS] += newtons
         if not math.isfinite(left):
@@ -362,8 +378,9 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
             allowed = near
             continue
         changed = postpone(S, count, h)
-        changed = let_stick(S, count, NOISE * left_of(S, h)) or changed
-        if not let_yield(S, count, allowed) and not changed:
+        changed = let_stick(S, count, noise_of(S, h)) or changed
+        noise = noise_of(S, h) * allowed / left_of(S, h)
+        if not let_yield(S, count, noise) and not changed:
             break
     spread_parts(S, count, h, slop, nb)
     fill_shift(S, nb)
@@ -378,7 +395,7 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
     tally.count[ALL_SWEEPS] += sweeps
     tally.count[ALL_STEPS] += 1
     tally.count[ALL_POINTS] += count
-    tally.count[UNSOLVED] += 1 if left > 1.0 else 0
+    tally.count[UNSOLVED] += 0 if solved else 1
     tally.count[PROJECTED] += 1 if pushes > 1 else 0
     pressing = 0
     for k in range(count):
@@ -456,7 +473,9 @@ def take_step(
         keep_loads(S, S.tally.count[POINTS], committed)
     for k in range(BODY_SIZE * len(scene.bodies.mass), len(y)):
         new[k] = y[k] + h * dy[k]
+    left = left_by_forces(scene, S, h)
     move_bodies(scene, S, y, h, new)
+    keep_left(S, left + left_by_spins(scene, S, new), committed)
     if S.tally.count[PRESSING] > 0:
         add_losses(scene, S, new)
         # impulses may throw bodies farther than was looked for
