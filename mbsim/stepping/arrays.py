@@ -62,6 +62,13 @@ TALLY_NUMBERS = 7
 AXES, TURN, SPIN, LIGHT = 0, 9, 27, 45
 W_NN, W_NX, W_NZ, W_XX, W_XZ, W_ZZ, STOPS, ALONG, SCHUR = 47, 48, 49, 50, 51, 52, 53, 59, 62
 GIVEN = 65
+# entries of `Rest.body`: 1 where a body sleeps; its island then; steps for which it was still; 1
+# where nothing of the island of which it is the first moves; of `Rest.count`: how many sleep, 1
+# where some were woken in the step at hand; of `Kept.count`, behind how many there are: of what
+# sleeps
+ASLEEP, ISLAND, CALM_STEPS, QUIET = range(4)
+SLEEPERS, WOKEN = 0, 1
+SLEEPING_ROWS = 1
 # entries of `Tally.load`: of the step tried last, its first half and its second; 1 where friction
 # yields at the begin of the step at hand, as far as is known; else how long after that, as the last
 # step saw it
@@ -158,9 +165,11 @@ class Points(NamedTuple):
 class Kept(NamedTuple):
     """Contact points that pressed in the last step that was taken."""
 
-    count: I1  # type: ignore[assignment]  # (1,)
+    count: I1  # type: ignore[assignment]  # (2,) how many, and of what sleeps, which come first
     key: I1  # (m,)
     table: F2  # (m, KEPT_COLUMNS)
+    spare_key: tags.Scratch[I1]  # (m,) what `sleep.put_sleepers_first` puts aside
+    spare: tags.Scratch[F2]  # (m, KEPT_COLUMNS)
     table_of_keys: tags.Scratch[I1]  # (2^k,) of the hash table of keys: 1 + first row, 0 for none
 
 
@@ -175,6 +184,16 @@ class Tally(NamedTuple):
     deepest: F1  # (nc,) depth of each contact at the begins of the parts of the step tried last
 
 
+@tags.state
+class Rest(NamedTuple):
+    """Which bodies sleep, or may soon: see `stepping.sleep`."""
+
+    body: I2  # (nb, 4)
+    since: F1  # (nb,) when a body that is still became so
+    count: I1  # type: ignore[assignment]  # (2,)
+    parent: tags.Scratch[I1]  # (nb,) an earlier body of the same island
+
+
 class Stepping(NamedTuple):
     """All of it."""
 
@@ -184,6 +203,7 @@ class Stepping(NamedTuple):
     points: Points
     kept: Kept
     tally: Tally
+    rest: Rest
 
 
 def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int, int]) -> Stepping:
@@ -252,10 +272,12 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int, in
         push=numbers(m),
     )
     room = 1 << max(4, int(4 * m - 1).bit_length())
-    kept = Kept(whole(1), whole(m), np.zeros((m, KEPT_COLUMNS)), whole(room))
+    table, spare = numbers(m, KEPT_COLUMNS), numbers(m, KEPT_COLUMNS)
+    kept = Kept(whole(2), whole(m), table, whole(m), spare, whole(room))
+    rest = Rest(whole(nb, 4), numbers(nb), whole(2), whole(nb))
     nc = len(rules.number)
     tally = Tally(
         np.zeros(TALLY_NUMBERS), whole(TALLY_COUNTS), numbers(nc, LOADS), whole(groups), numbers(nc)
     )
     tally.load[:, DUE] = 1.0
-    return Stepping(rules, plan, motion, points, kept, tally)
+    return Stepping(rules, plan, motion, points, kept, tally, rest)

@@ -19,7 +19,7 @@ from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
 from mbsim.core.rotation import matrix_from_quaternion, norm, unrotate, vector
 from mbsim.dynamics.bodies.configuration import turn
 from mbsim.dynamics.bodies.kinematics import place_bodies
-from mbsim.stepping.arrays import LEFT_SPEED, POINTS, STEP_LENGTH, Stepping
+from mbsim.stepping.arrays import ASLEEP, LEFT_SPEED, POINTS, STEP_LENGTH, Stepping
 from mbsim.stepping.one_point import velocity_of
 
 #: Of `Points.part` and `Motion.part`: no impact with restitution.
@@ -145,6 +145,10 @@ def move_bodies(scene: Scene, S: Stepping, y: F1, h: float, new: F1) -> None:
     M = S.motion
     for b in range(len(scene.bodies.mass)):
         at, R = BODY_SIZE * b, scene.work.R[b]
+        if S.rest.body[b, ASLEEP] == 1:
+            for c in range(at, at + BODY_SIZE):
+                new[c] = y[c]
+            continue
         for c in range(3):
             new[at + c] = y[at + c] + h * M.shift[b, c]
             new[at + AT_V + c] = M.v[b, c]

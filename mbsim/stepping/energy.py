@@ -17,7 +17,7 @@ from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import AT_W, BODY_SIZE
 from mbsim.core.rotation import add, dot, rotate, scale, sub, unrotate, vector
-from mbsim.stepping.arrays import LEFT_OPEN, Stepping
+from mbsim.stepping.arrays import ASLEEP, LEFT_OPEN, Stepping
 
 
 @jitable
@@ -35,6 +35,8 @@ def left_by_forces(scene: Scene, S: Stepping, h: float) -> float:
     """
     M, total = S.motion, 0.0
     for b in range(len(scene.bodies.mass)):
+        if S.rest.body[b, ASLEEP] == 1:
+            continue
         before, v, shift = M.before[b], M.v[b], M.shift[b]
         off = sub(vector(shift), scale(0.5, add(vector(before), vector(v))))
         total += abs(h * dot(vector(scene.work.force[b]), off))
@@ -52,7 +54,7 @@ def left_by_spins(scene: Scene, S: Stepping, new: F1) -> float:
     """Return by how much kinetic energies of free bodies' spins are not what impulses make them."""
     total = 0.0
     for b in range(len(scene.bodies.mass)):
-        if scene.tree.of_body[b] < 0:
+        if scene.tree.of_body[b] < 0 and S.rest.body[b, ASLEEP] == 0:
             w = vector(new, BODY_SIZE * b + AT_W)
             kinetic = 0.5 * dot(w, rotate(scene.bodies.inertia[b], w))
             total += abs(kinetic - S.motion.spins[b])

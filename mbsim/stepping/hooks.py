@@ -32,6 +32,7 @@ from mbsim.stepping.rows import (
     push_as_kept,
     watch_peaks,
 )
+from mbsim.stepping.sleep import let_sleep, wake_all
 from mbsim.stepping.step import take_step, want_room
 
 
@@ -131,6 +132,10 @@ def commit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     accept(scene, t, h, y)
     if h > 0.0 and S.plan.number[FIXED] == 0.0:
         keep_yield(S, h)
+    if h > 0.0:
+        let_sleep(scene, S, t, h, y)
+    else:
+        wake_all(S)
     examine_step(scene, S, t, h, y)
     word = 0
     if no_room(scene):

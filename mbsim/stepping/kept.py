@@ -33,6 +33,7 @@ from mbsim.stepping.arrays import (
     KEPT_TANGENT,
     KEPT_WEIGHT,
     POINTS,
+    SLEEPING_ROWS,
     STEP_LENGTH,
     Stepping,
 )
@@ -63,8 +64,8 @@ def index_kept(S: Stepping) -> None:
     kept, room = S.kept, room_of(S)
     for at in range(room):
         kept.table_of_keys[at] = 0
-    for row in range(kept.count[0]):
-        if row > 0 and kept.key[row] == kept.key[row - 1]:
+    for row in range(kept.count[SLEEPING_ROWS], kept.count[0]):
+        if row > kept.count[SLEEPING_ROWS] and kept.key[row] == kept.key[row - 1]:
             continue
         at = place_of(kept.key[row], room)
         while kept.table_of_keys[at] != 0:
@@ -129,7 +130,7 @@ def recall(S: Stepping, h: float) -> None:
     """Start all impulses of a step h from what the points pressed in the last one."""
     P, kept, count = S.points, S.kept, S.tally.count[POINTS]
     begin = 0
-    for row in range(kept.count[0]):
+    for row in range(kept.count[SLEEPING_ROWS], kept.count[0]):
         kept.table[row, KEPT_STAYS] = 0.0
     while begin < count:
         end = begin + 1
@@ -157,7 +158,7 @@ def share_sticking(S: Stepping) -> None:
 
     How they share it is not determined.
     """
-    kept, begin = S.kept, 0
+    kept, begin = S.kept, S.kept.count[SLEEPING_ROWS]
     while begin < kept.count[0]:
         end, most, total = begin, 0.0, (0.0, 0.0, 0.0)
         while end < kept.count[0] and kept.key[end] == kept.key[begin]:
@@ -177,7 +178,7 @@ def keep_points(scene: Scene, S: Stepping) -> None:
     """Keep the points that press in the step that is taken."""
     P, kept, M = S.points, S.kept, S.motion
     h = S.tally.number[STEP_LENGTH]
-    row = 0
+    row = kept.count[SLEEPING_ROWS]
     for k in range(S.tally.count[POINTS]):
         if P.r[k, 0] == 0.0:
             continue

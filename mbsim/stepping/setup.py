@@ -30,6 +30,7 @@ from mbsim.stepping.arrays import (
     PLAN_NUMBERS,
     PROJECTED,
     PUSH_SPEED,
+    SLEEPERS,
     SLOP,
     SOME_AHEAD,
     UNSOLVED,
@@ -112,6 +113,7 @@ class Made(NamedTuple):
             "contact_unsolved": int(count[UNSOLVED]),
             "contact_projections": int(count[PROJECTED]),
             "contact_points": int(count[ALL_POINTS]),
+            "asleep_at_end": int(self.stepping.rest.count[SLEEPERS]),
         }
 
 

@@ -43,6 +43,7 @@ from mbsim.stepping.arrays import (
     ALL_POINTS,
     ALL_STEPS,
     ALL_SWEEPS,
+    ASLEEP,
     FIXED,
     HIT,
     KEPT_STICKS,
@@ -59,6 +60,7 @@ from mbsim.stepping.arrays import (
     STEP_LENGTH,
     UNSOLVED,
     W_NN,
+    WOKEN,
     Stepping,
 )
 from mbsim.stepping.displacements import (
@@ -83,6 +85,7 @@ from mbsim.stepping.kept import index_kept, recall
 from mbsim.stepping.one_point import apply, velocity_of
 from mbsim.stepping.pairs import find_missed, find_points
 from mbsim.stepping.points import fill_point, fill_reach, way_at
+from mbsim.stepping.sleep import wake_loaded
 from mbsim.stepping.solver import project_positions, solve_points
 
 #: Newton iterations for the spin of a body at most.
@@ -209,6 +212,8 @@ def fill_motion(scene: Scene, S: Stepping, y: F1, h: float) -> None:
     """Fill velocities before the step and without contacts, and inverse masses."""
     M, bodies, dy = S.motion, scene.bodies, S.motion.slope
     for b in range(len(bodies.mass)):
+        if S.rest.body[b, ASLEEP] == 1:
+            continue
         at, R = BODY_SIZE * b, scene.work.R[b]
         before, free, inverse = M.before[b], M.free[b], M.inverse[b]
         w = vector(scene.work.w[b])
@@ -419,7 +424,8 @@ def solve_by_middle(scene: Scene, S: Stepping, t: float, h: float, y: F1, commit
             M.v[b, c] = 0.5 * (M.before[b, c] + M.v[b, c])
     move_bodies(scene, S, y, 0.5 * h, middle)
     code = find_forces(scene, t + 0.5 * h, middle, dy)
-    if code != 0:
+    wake_loaded(scene, S)
+    if code != 0 or S.rest.count[WOKEN] == 1:
         return code
     place_bodies(scene, y)
     fill_motion(scene, S, y, h)
@@ -440,6 +446,8 @@ def solve_all(scene: Scene, S: Stepping, t: float, h: float, y: F1, committed: b
             missed = find_missed(scene, S, y, h)
         if missed < 0:
             return -missed
+        if S.rest.count[WOKEN] == 1:
+            return 0
         if missed == 0:
             break
     if scene.world.hooks[Hook.APPLIED] != 0 or scene.world.hooks[Hook.JOINTS] != 0:
@@ -456,19 +464,23 @@ def take_step(
     if committed:
         for c in range(len(S.tally.deepest)):
             S.tally.deepest[c] = 0.0
-    code = find_forces(scene, t, y, dy)
-    if code != 0:
-        return code
-    fill_motion(scene, S, y, h)
-    if committed:
-        index_kept(S)
-        make_room(scene, S, y, h)
-    code = find_points(scene, S, y, h, committed)
-    if code != 0:
-        return code
-    code = solve_all(scene, S, t, h, y, committed)
-    if code != 0:
-        return code
+    S.rest.count[WOKEN] = 1
+    while S.rest.count[WOKEN] == 1:
+        # once more where something wakes: with all that is awake then
+        S.rest.count[WOKEN] = 0
+        code = find_forces(scene, t, y, dy)
+        if code != 0:
+            return code
+        wake_loaded(scene, S)
+        fill_motion(scene, S, y, h)
+        if committed:
+            index_kept(S)
+            make_room(scene, S, y, h)
+        code = find_points(scene, S, y, h, committed)
+        if code == 0 and S.rest.count[WOKEN] == 0:
+            code = solve_all(scene, S, t, h, y, committed)
+        if code != 0:
+            return code
     if S.plan.number[FIXED] == 0.0:
         keep_loads(S, S.tally.count[POINTS], committed)
     for k in range(BODY_SIZE * len(scene.bodies.mass), len(y)):
