@@ -18,6 +18,7 @@ class Transient:
     h_max: float | None = None
     h_min: float | None = None
     h0_max: float | None = None
+    sleep: bool | None = None
     source: Source = Source()
 
 

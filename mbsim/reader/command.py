@@ -258,6 +258,7 @@ PARAM_TRANSIENT = Statement(
         "h_max": Spec(POSITIVE, "longest step", "T", "none"),
         "h_min": Spec(POSITIVE, "shortest step; a shorter one ends the run", "T", "rounding"),
         "h0_max": Spec(POSITIVE, "longest first step", "T", "none"),
+        "sleep": Spec(FLAG, "FALSE: MOREAU solves what is at rest too", "", "TRUE"),
         **{name: Spec(kind, note=_NO_EFFECT) for name, kind in _UNUSED.items()},
     },
     _build_transient,

@@ -180,15 +180,16 @@ class Audit:
 
     @property
     def line(self) -> str:
-        """The one line at a run's end; the balance is no measure of rigid contacts."""
+        """The one line at a run's end."""
+        line = f"balance closes to {self.balance:.1g} of {self.of:.3g} {self.unit}"
         left, deep = self.entries.get("contact_residual"), self.entries.get("penetration")
         if left is not None:
             depth = deep.value if deep is not None else 0.0
-            return (
-                f"contact problems are solved to a velocity of {left.value:.1g}, "
+            line += (
+                f"; contact problems are solved to a velocity of {left.value:.1g}, "
                 f"rigid shapes go {depth:.1g} deep"
             )
-        return f"balance closes to {self.balance:.1g} of {self.of:.3g} {self.unit}"
+        return line
 
 
 def audit_of(system: System, left: float, left_time: float) -> Audit | None:
@@ -240,10 +241,12 @@ def audit_of(system: System, left: float, left_time: float) -> Audit | None:
     if part > COARSE and not any(
         entries[name].excess > 1.0 for name in ENERGIES if name in entries
     ):
+        why = f"tol {kept.plan[codes.AUDIT_TOL]:g} explains: choose a smaller one"
+        if "step_end" in entries:
+            why = "the deck's step explains: choose a shorter one"
         warnings.append(
             f"the energy balance is off by {balance:.2g} {unit}, {100.0 * part:.2g} % of the usual "
-            f"energy of {usual:.3g} {unit}, at time {time:.9g}, as tol "
-            f"{kept.plan[codes.AUDIT_TOL]:g} explains: choose a smaller one"
+            f"energy of {usual:.3g} {unit}, at time {time:.9g}, as {why}"
         )
     return Audit(balance, size, time, unit, entries, shares, tuple(warnings))
 

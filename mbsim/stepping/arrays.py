@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mbsim.core import tags
-from mbsim.core.arrays import F1, F2, F3, F4, I1, I2
+from mbsim.core.arrays import F1, F2, F3, I1, I2
 
 #: Speeds at which a coefficient of friction is tabled, and the step of their logarithm's base 2.
 SPEEDS = 64
@@ -44,14 +44,31 @@ KEPT_COLUMNS = 26
 # and changes of position do not count; what the solver may leave of a velocity, times h; 1 where
 # some kind of pair is not near; how fast positions are projected, see `solver.project_positions`;
 # what may be left of a velocity at most, however short a step; and part of a step's jumps that may;
-# how near to where friction yields a step is to end; the model's own time L/V
+# how near to where friction yields a step is to end; the model's own time L/V; how far closing and
+# slipping may go in a step and are none; 1 where bodies at rest may sleep
 FIXED, SLOP, LEFT, SOME_AHEAD, PUSH_SPEED, LEFT_SPEED, LEFT_PART, NEAR, OWN_TIME = range(9)
-PLAN_NUMBERS = 9
+NOISE, MAY_SLEEP = 9, 10
+PLAN_NUMBERS = 11
 # entries of `Tally.number`, of the last step tried: what the solver left, as a velocity; its
 # length; the contact that closed fastest in it, and by how much within its length; how far its end
-# is from that of two halves; 1 where velocities jump in it or in either of two halves
-RESIDUAL, STEP_LENGTH, FASTEST, CLOSED, END_OFF, HIT = range(6)
-TALLY_NUMBERS = 6
+# is from that of two halves; 1 where velocities jump in it or in either of two halves; the energy
+# that it leaves open by the way it moves bodies on (`energy.left_open`)
+RESIDUAL, STEP_LENGTH, FASTEST, CLOSED, END_OFF, HIT, LEFT_OPEN = range(7)
+TALLY_NUMBERS = 7
+# entries of `Points.given`: axes n, x, z; a x axis for I's arm a, then J's; I^-1 of these, as each
+# body's inertia is; inverse masses of I and J; u by r, a symmetric matrix; its inverse, row by row
+# from the diagonal on, 0 where it has none; 1/W_nn, and W_nx, W_nz over W_nn; of x, z what of W is
+# left where n is held
+AXES, TURN, SPIN, LIGHT = 0, 9, 27, 45
+W_NN, W_NX, W_NZ, W_XX, W_XZ, W_ZZ, STOPS, ALONG, SCHUR = 47, 48, 49, 50, 51, 52, 53, 59, 62
+GIVEN = 65
+# entries of `Rest.body`: 1 where a body sleeps; its island then; steps for which it was still; 1
+# where nothing of the island of which it is the first moves; of `Rest.count`: how many sleep, 1
+# where some were woken in the step at hand; of `Kept.count`, behind how many there are: of what
+# sleeps
+ASLEEP, ISLAND, CALM_STEPS, QUIET = range(4)
+SLEEPERS, WOKEN = 0, 1
+SLEEPING_ROWS = 1
 # entries of `Tally.load`: of the step tried last, its first half and its second; 1 where friction
 # yields at the begin of the step at hand, as far as is known; else how long after that, as the last
 # step saw it
@@ -94,8 +111,10 @@ class Motion(NamedTuple):
     free: F2  # (nb + 1, 6) at its end, were there no contacts
     v: F2  # (nb + 1, 6) with them
     shift: F2  # (nb + 1, 6) displacement over the step's length
+    changed: I1  # (nb + 1,) the sweep that changed a body's velocity last by what counts
     part: F1  # (nb + 1,) of `before` in that, the rest being v's
     touch: F1  # (nb + 1,) part of the step at which a body first meets something that turns it
+    spins: F1  # (nb,) kinetic energy of a spin as impulses make it, see `energy`
     flies: F1  # (nb + 1,) whether it flies before that and behind, see `displacements`
     reach: F1  # (ng,) how far a graphic may come in the step
     went: F1  # (ng,) how far it goes by what impulses give
@@ -103,6 +122,7 @@ class Motion(NamedTuple):
     way: F2  # (2, 6) velocities of the bodies of a pair that is moved ahead
     frames: F2  # (2, 12) of its graphics at the step's begin
     taken: I1  # (pairs + 1,) the try of a step in which a pair has points by that; last: this one
+    measured: I1  # (pairs,) list of near pairs in which its rows were measured, -1 for none
     impulse: F1  # (ny,) impulses on bodies, then what they change of velocities
     middle: F1  # (ny,) state in the midst of a step
     half: F2  # (2, ny) states of a step's two halves, where it is compared with them
@@ -123,16 +143,14 @@ class Points(NamedTuple):
     arm: F3  # (m, 2, 3) from the bodies' cg, when the point touches
     normal: F2  # (m, 3)
     tangent: F2  # (m, 3)
-    H: F4  # (m, 2, 3, 6) velocity along (n, x, y) by those of the bodies
-    answer: F4  # (m, 2, 3, 6) velocities of the bodies by each of r, where joints hold neither
+    given: F2  # (m, GIVEN) what the solver reads of the point, see above
     wide: I1  # (m,) else first row of `moved`, -1 where they do not
     many: I1  # (m,) its rows there
     moved: I1  # (wide rows,) bodies that r moves
     moves: F3  # (wide rows, 6, 3) their velocities by r
-    W: F3  # (m, 3, 3) u by r
-    stops: F3  # (m, 3, 3) its inverse, 0 where it has none
     mu: F1  # (m,)
     holds: F1  # (m,) mu as it is at the step's begin
+    slides: F1  # (m,) s of `one_point.slip_of` as found last, 0 for none
     ahead: F1  # (m,) u_n + ahead >= 0 where the point closes
     part: F1  # (m,) of the step before an impact with restitution
     closing: F1  # (m,) u_n before the step
@@ -147,9 +165,11 @@ class Points(NamedTuple):
 class Kept(NamedTuple):
     """Contact points that pressed in the last step that was taken."""
 
-    count: I1  # type: ignore[assignment]  # (1,)
+    count: I1  # type: ignore[assignment]  # (2,) how many, and of what sleeps, which come first
     key: I1  # (m,)
     table: F2  # (m, KEPT_COLUMNS)
+    spare_key: tags.Scratch[I1]  # (m,) what `sleep.put_sleepers_first` puts aside
+    spare: tags.Scratch[F2]  # (m, KEPT_COLUMNS)
     table_of_keys: tags.Scratch[I1]  # (2^k,) of the hash table of keys: 1 + first row, 0 for none
 
 
@@ -160,7 +180,18 @@ class Tally(NamedTuple):
     number: F1  # (TALLY_NUMBERS,)
     count: I1  # type: ignore[assignment]  # (TALLY_COUNTS,)
     load: F2  # (nc, LOADS) friction of pairs that stick over the most it may be
+    grounded: I1  # (groups,) 1 where ground pressed on a group of bodies since the last sample
     deepest: F1  # (nc,) depth of each contact at the begins of the parts of the step tried last
+
+
+@tags.state
+class Rest(NamedTuple):
+    """Which bodies sleep, or may soon: see `stepping.sleep`."""
+
+    body: I2  # (nb, 4)
+    since: F1  # (nb,) when a body that is still became so
+    count: I1  # type: ignore[assignment]  # (2,)
+    parent: tags.Scratch[I1]  # (nb,) an earlier body of the same island
 
 
 class Stepping(NamedTuple):
@@ -172,14 +203,16 @@ class Stepping(NamedTuple):
     points: Points
     kept: Kept
     tally: Tally
+    rest: Rest
 
 
-def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int]) -> Stepping:
+def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int, int]) -> Stepping:
     """Return empty arrays.
 
-    `sizes` are the numbers of bodies, graphics, numbers of y, contact points, pairs, wide rows.
+    `sizes` are the numbers of bodies, graphics, numbers of y, contact points, pairs, wide rows,
+    groups of bodies.
     """
-    nb, ng, ny, m, pairs, wide = sizes
+    nb, ng, ny, m, pairs, wide, groups = sizes
 
     def whole(*shape: int) -> np.ndarray:
         return np.zeros(shape, dtype=np.int64)
@@ -193,8 +226,10 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int]) -
         free=numbers(nb + 1, 6),
         v=numbers(nb + 1, 6),
         shift=numbers(nb + 1, 6),
+        changed=whole(nb + 1),
         part=numbers(nb + 1),
         touch=numbers(nb + 1),
+        spins=numbers(nb),
         flies=numbers(nb + 1),
         reach=numbers(ng),
         went=numbers(ng),
@@ -202,6 +237,7 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int]) -
         way=numbers(2, 6),
         frames=numbers(2, 12),
         taken=whole(pairs + 1),
+        measured=whole(pairs) - 1,
         impulse=numbers(ny),
         middle=numbers(ny),
         half=numbers(2, ny),
@@ -218,16 +254,14 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int]) -
         arm=numbers(m, 2, 3),
         normal=numbers(m, 3),
         tangent=numbers(m, 3),
-        H=numbers(m, 2, 3, 6),
-        answer=numbers(m, 2, 3, 6),
+        given=numbers(m, GIVEN),
         wide=whole(m),
         many=whole(m),
         moved=whole(wide),
         moves=numbers(wide, 6, 3),
-        W=numbers(m, 3, 3),
-        stops=numbers(m, 3, 3),
         mu=numbers(m),
         holds=numbers(m),
+        slides=numbers(m),
         ahead=numbers(m),
         part=numbers(m),
         closing=numbers(m),
@@ -238,8 +272,12 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int]) -
         push=numbers(m),
     )
     room = 1 << max(4, int(4 * m - 1).bit_length())
-    kept = Kept(whole(1), whole(m), np.zeros((m, KEPT_COLUMNS)), whole(room))
+    table, spare = numbers(m, KEPT_COLUMNS), numbers(m, KEPT_COLUMNS)
+    kept = Kept(whole(2), whole(m), table, whole(m), spare, whole(room))
+    rest = Rest(whole(nb, 4), numbers(nb), whole(2), whole(nb))
     nc = len(rules.number)
-    tally = Tally(np.zeros(TALLY_NUMBERS), whole(TALLY_COUNTS), numbers(nc, LOADS), numbers(nc))
+    tally = Tally(
+        np.zeros(TALLY_NUMBERS), whole(TALLY_COUNTS), numbers(nc, LOADS), whole(groups), numbers(nc)
+    )
     tally.load[:, DUE] = 1.0
-    return Stepping(rules, plan, motion, points, kept, tally)
+    return Stepping(rules, plan, motion, points, kept, tally, rest)

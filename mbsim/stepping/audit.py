@@ -2,13 +2,12 @@
 
 * what the solver left: the change of a velocity that one more sweep would make, over what it may
   be by the tolerance;
+* energy and momentum, as all runs (`pipeline.audit`): what a step explains of the balance is what
+  it is known to leave open by the way it moves bodies on (`stepping.energy`);
 * penetration at the step's begin;
 * of steps as long as the deck says: how far impacts leave them off (`stepping.halves`);
 * friction over mu N;
 * residuals of constraints and their rates.
-
-The energy balance is no measure: impacts take energy, and what they take is found by the same
-velocities.
 """
 
 from __future__ import annotations
@@ -16,14 +15,20 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import (
+    ANEW,
     AUDIT_EVERY,
     AUDIT_TOL,
+    AUDIT_UNTIL,
     CONE,
+    ERRORS_ALL,
+    ERRORS_SINCE,
+    LARGEST_ENERGY,
     LARGEST_FRICTION,
     PENETRATION,
     STEP_END,
     STEPS_ALL,
     STEPS_SINCE,
+    TIME_THEN,
     UNSOLVED_IMPULSES,
     USUAL_ENERGY,
 )
@@ -33,17 +38,22 @@ from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.scales import fill_squares
-from mbsim.dynamics.pipeline.audit import note
+from mbsim.dynamics.pipeline.audit import SPINS, examine_energy, examine_momentum, note
 from mbsim.stepping.arrays import (
     END_OFF,
     FASTEST,
     FIXED,
+    KEPT_BODY_I,
+    KEPT_BODY_J,
+    LEFT_OPEN,
     POINTS,
     RESIDUAL,
+    SLEEPING_ROWS,
     STEP_LENGTH,
     Stepping,
 )
 from mbsim.stepping.friction import left_of
+from mbsim.stepping.step import find_forces, note_grounded
 
 #: Rounding of friction on its cone.
 CONE_ROUNDING = 1e-12
@@ -83,6 +93,8 @@ def examine_step(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> None:
     """Note what the step that ends at t leaves open."""
     tally, number = scene.audit.tally, S.tally.number
     if h == 0.0:
+        tally[ANEW] = 1.0
+        take_sample(scene, S, t, y)
         return
     tally[STEPS_ALL] += 1.0
     allowed = left_of(S, number[STEP_LENGTH])
@@ -91,14 +103,45 @@ def examine_step(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> None:
     if S.plan.number[FIXED] == 1.0 and len(scene.contacts.id) > 0:
         note(scene, STEP_END, number[END_OFF], explained(scene, S), t, int(number[FASTEST]))
     tally[STEPS_SINCE] += 1.0
-    if tally[STEPS_SINCE] < scene.audit.plan[AUDIT_EVERY]:
-        return
-    tally[STEPS_SINCE] = 0.0
+    size = max(tally[LARGEST_ENERGY], tally[USUAL_ENERGY])
+    if size > 0.0:
+        local = number[LEFT_OPEN] / size
+        tally[ERRORS_SINCE] += local
+        tally[ERRORS_ALL] += local
+    due = tally[STEPS_SINCE] >= scene.audit.plan[AUDIT_EVERY]
+    if due or t + 1e-9 * h >= scene.audit.plan[AUDIT_UNTIL]:
+        take_sample(scene, S, t, y)
+
+
+@jitable
+def mark_grounded(scene: Scene, S: Stepping) -> None:
+    """Mark the groups that ground pressed on since the last sample, and begin anew."""
+    for row in range(S.kept.count[SLEEPING_ROWS]):
+        i, j = int(S.kept.table[row, KEPT_BODY_I]), int(S.kept.table[row, KEPT_BODY_J])
+        note_grounded(scene, S, i, j)
+    for g in range(len(S.tally.grounded)):
+        if S.tally.grounded[g] == 1:
+            scene.audit.sums[g, SPINS + 1] = 1.0
+        S.tally.grounded[g] = 0
+
+
+@jitable
+def take_sample(scene: Scene, S: Stepping, t: float, y: F1) -> None:
+    """Compare energy and momentum with what they were, and look at constraints."""
+    tally = scene.audit.tally
+    steps, local = tally[STEPS_SINCE], tally[ERRORS_SINCE]
+    tally[STEPS_SINCE] = tally[ERRORS_SINCE] = 0.0
+    if scene.world.hooks[Hook.APPLIED] != 0:
+        # what springs store is that of the state
+        note_failure(scene, find_forces(scene, t, y, S.motion.slope))
     fill_squares(scene, y)
     for g in range(len(scene.work.squares)):
         energy = scene.scales.mass[g] * scene.work.squares[g]
         tally[USUAL_ENERGY] = max(tally[USUAL_ENERGY], energy)
-    if scene.world.hooks[Hook.JOINTS] != 0:
+    examine_energy(scene, t, y, steps, local)
+    examine_momentum(scene, t, y, steps, local)
+    if tally[ANEW] == 0.0 and scene.world.hooks[Hook.JOINTS] != 0:
         joints = scene.world.hooks[Hook.JOINTS]
         note_failure(scene, call_int(joints, (scene, Joints.READY, t, y, y)))
         note_failure(scene, call_int(joints, (scene, Joints.AUDIT, t, y, y)))
+    tally[TIME_THEN], tally[ANEW] = t, 0.0

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbsim.stepping.arrays import POINTS, PRESSING, STEP_LENGTH, Stepping
+from mbsim.stepping.one_point import directions
 
 if TYPE_CHECKING:
     from mbsim.fclib.problem import Global, Local, Solution
@@ -69,7 +70,7 @@ def _directions(S: Stepping, count: int) -> Any:
     from scipy import sparse
 
     nb = len(S.motion.inverse)
-    bodies, H = S.points.body[:count], S.points.H[:count]
+    bodies, H = S.points.body[:count], directions(S.points, count, nb)
     k, side, a, c = np.nonzero(H)
     row, moves = 6 * bodies[k, side] + c, bodies[k, side] < nb
     places = row[moves], (3 * k + a)[moves]

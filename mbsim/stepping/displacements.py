@@ -19,8 +19,8 @@ from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
 from mbsim.core.rotation import matrix_from_quaternion, norm, unrotate, vector
 from mbsim.dynamics.bodies.configuration import turn
 from mbsim.dynamics.bodies.kinematics import place_bodies
-from mbsim.stepping.arrays import LEFT_SPEED, POINTS, STEP_LENGTH, Stepping
-from mbsim.stepping.solver import velocity_of
+from mbsim.stepping.arrays import ASLEEP, LEFT_SPEED, POINTS, STEP_LENGTH, Stepping
+from mbsim.stepping.one_point import velocity_of
 
 #: Of `Points.part` and `Motion.part`: no impact with restitution.
 NO_IMPACT = 2.0
@@ -59,9 +59,9 @@ def start_parts(S: Stepping, count: int, h: float, slop: float, ground: int) -> 
         part, touch, flies = P.part[k], P.part[k], FLIES if P.ahead[k] < 0.0 else LANDS
         if part == NO_IMPACT:
             flies = PRESSED
-            after = velocity_of(P.H, k, 0, M.v, i, j)
+            after = velocity_of(P, k, 0, M.v)
             if 0.5 * h * abs(after - P.closing[k]) > slop:
-                free = velocity_of(P.H, k, 0, M.free, i, j)
+                free = velocity_of(P, k, 0, M.free)
                 part, touch = 0.0, meets_at(P.gap[k], h, P.closing[k], free)
         for b in (i, j):
             M.part[b], M.touch[b] = min(M.part[b], part), min(M.touch[b], touch)
@@ -145,6 +145,10 @@ def move_bodies(scene: Scene, S: Stepping, y: F1, h: float, new: F1) -> None:
     M = S.motion
     for b in range(len(scene.bodies.mass)):
         at, R = BODY_SIZE * b, scene.work.R[b]
+        if S.rest.body[b, ASLEEP] == 1:
+            for c in range(at, at + BODY_SIZE):
+                new[c] = y[c]
+            continue
         for c in range(3):
             new[at + c] = y[at + c] + h * M.shift[b, c]
             new[at + AT_V + c] = M.v[b, c]

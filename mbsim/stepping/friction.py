@@ -14,6 +14,7 @@ from mbsim.stepping.arrays import (
     LEFT,
     LEFT_SPEED,
     NEAR,
+    NOISE,
     OF_FIRST,
     OF_SECOND,
     OF_WHOLE,
@@ -21,13 +22,15 @@ from mbsim.stepping.arrays import (
     PUSH_SPEED,
     SPEEDS,
     STICKING,
+    W_XX,
+    W_ZZ,
     Stepping,
 )
-from mbsim.stepping.solver import velocity_of
+from mbsim.stepping.one_point import velocity_of
 
-#: Closing speeds have no restitution, and slips are none, up to so many times what the solver may
-#: leave of a velocity.
-NOISE = 30.0
+#: Closing and slipping are none up to so many times what the solver may leave of a velocity at
+#: most, however short a step.
+NOISE_OF_SPEED = 30.0
 #: Changes of mu that do not count.
 YIELDS = 1e-3
 #: A load as large as it may be.
@@ -48,6 +51,13 @@ def left_of(S: Stepping, h: float) -> float:
     velocity behind an impact in a step that is very short.
     """
     return min(S.plan.number[LEFT] / h, S.plan.number[LEFT_SPEED])
+
+
+@jitable
+def noise_of(S: Stepping, h: float) -> float:
+    """Return the speed up to which closing and slipping in a step h are none."""
+    number = S.plan.number
+    return min(number[NOISE] / h, NOISE_OF_SPEED * number[LEFT_SPEED])
 
 
 @jitable
@@ -81,7 +91,7 @@ def load_of(S: Stepping, begin: int, end: int) -> float:
 
 
 @jitable
-def let_yield(S: Stepping, count: int, allowed: float) -> bool:
+def let_yield(S: Stepping, count: int, noise: float) -> bool:
     """Lower mu where what stuck slips, to that of its slip; return whether that changed much.
 
     A step in which friction yields is then one that slides from its begin: steps by error end where
@@ -96,12 +106,11 @@ def let_yield(S: Stepping, count: int, allowed: float) -> bool:
         for k in range(begin, end):
             if P.r[k, 0] == 0.0 or P.holds[k] < S.rules.number[P.contact[k], STICKING]:
                 continue
-            i, j = P.body[k, 0], P.body[k, 1]
-            x, z = velocity_of(P.H, k, 1, M.v, i, j), velocity_of(P.H, k, 2, M.v, i, j)
+            x, z = velocity_of(P, k, 1, M.v), velocity_of(P, k, 2, M.v)
             slip = math.sqrt(x * x + z * z)
             if load < 0.0:
                 load = load_of(S, begin, end)
-            if load < SATURATED and slip <= NOISE * allowed:
+            if load < SATURATED and slip <= noise:
                 continue
             mu = coefficient(S, P.contact[k], slip)
             if mu < (1.0 - YIELDS) * P.mu[k]:
@@ -123,10 +132,10 @@ def let_stick(S: Stepping, count: int, noise: float) -> bool:
         sticking = S.rules.number[P.contact[k], STICKING]
         if P.r[k, 0] == 0.0 or P.holds[k] >= sticking:
             continue
-        i, j, along, square = P.body[k, 0], P.body[k, 1], 0.0, 0.0
+        along, square = 0.0, 0.0
         for a in range(1, 3):
-            before = velocity_of(P.H, k, a, M.before, i, j)
-            along += before * velocity_of(P.H, k, a, M.v, i, j)
+            before = velocity_of(P, k, a, M.before)
+            along += before * velocity_of(P, k, a, M.v)
             square += before * before
         if along < 0.0 or square <= noise * noise:
             P.holds[k] = P.mu[k] = sticking
@@ -150,7 +159,9 @@ def left_near_yield(S: Stepping, count: int) -> float:
         rule = S.rules.number[c]
         drops = rule[DROPS] == 1.0 and P.holds[begin] >= rule[STICKING]
         if drops and most > 0.0 and load_of(S, begin, end) > CLOSE:
-            least = min(least, SHARPER * tol * most * max(P.W[begin, 1, 1], P.W[begin, 2, 2]))
+            least = min(
+                least, SHARPER * tol * most * max(P.given[begin, W_XX], P.given[begin, W_ZZ])
+            )
         begin = end
     return least
 

@@ -18,7 +18,7 @@ from mbsim.dynamics.contact.detection import find_contacts
 from mbsim.dynamics.pipeline.hooks import accept
 from mbsim.dynamics.pipeline.output import no_room, scaled_error
 from mbsim.stepping.arrays import ALL_STEPS, FIXED, HIT, Stepping
-from mbsim.stepping.audit import examine_step
+from mbsim.stepping.audit import examine_step, mark_grounded
 from mbsim.stepping.displacements import place_within
 from mbsim.stepping.friction import keep_yield, part_to_yield
 from mbsim.stepping.halves import take_fixed_step
@@ -32,6 +32,7 @@ from mbsim.stepping.rows import (
     push_as_kept,
     watch_peaks,
 )
+from mbsim.stepping.sleep import let_sleep, wake_all
 from mbsim.stepping.step import take_step, want_room
 
 
@@ -69,6 +70,8 @@ def serve_contacts(context: int, what: int, t: float, h: float, a: Pointer, b: P
         watch_peaks(scene, S, t)
     elif what == Contacts.GAPS:
         commit_distances(scene)
+    elif what == Contacts.TOUCHED:
+        mark_grounded(scene, S)
     elif what == Contacts.ENERGY:
         add_lost(scene, y, vector_at(b, scene.rows.energy.shape[1]))
     elif what == Contacts.ROW:
@@ -129,6 +132,10 @@ def commit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     accept(scene, t, h, y)
     if h > 0.0 and S.plan.number[FIXED] == 0.0:
         keep_yield(S, h)
+    if h > 0.0:
+        let_sleep(scene, S, t, h, y)
+    else:
+        wake_all(S)
     examine_step(scene, S, t, h, y)
     word = 0
     if no_room(scene):

@@ -33,10 +33,11 @@ from mbsim.stepping.arrays import (
     KEPT_TANGENT,
     KEPT_WEIGHT,
     POINTS,
+    SLEEPING_ROWS,
     STEP_LENGTH,
     Stepping,
 )
-from mbsim.stepping.solver import velocity_of
+from mbsim.stepping.one_point import velocity_of
 
 #: A multiplier that spreads keys over a table: 2^64 over the golden ratio, odd, made positive.
 SPREAD = 0x1E3779B97F4A7C15
@@ -63,8 +64,8 @@ def index_kept(S: Stepping) -> None:
     kept, room = S.kept, room_of(S)
     for at in range(room):
         kept.table_of_keys[at] = 0
-    for row in range(kept.count[0]):
-        if row > 0 and kept.key[row] == kept.key[row - 1]:
+    for row in range(kept.count[SLEEPING_ROWS], kept.count[0]):
+        if row > kept.count[SLEEPING_ROWS] and kept.key[row] == kept.key[row - 1]:
             continue
         at = place_of(kept.key[row], room)
         while kept.table_of_keys[at] != 0:
@@ -129,7 +130,7 @@ def recall(S: Stepping, h: float) -> None:
     """Start all impulses of a step h from what the points pressed in the last one."""
     P, kept, count = S.points, S.kept, S.tally.count[POINTS]
     begin = 0
-    for row in range(kept.count[0]):
+    for row in range(kept.count[SLEEPING_ROWS], kept.count[0]):
         kept.table[row, KEPT_STAYS] = 0.0
     while begin < count:
         end = begin + 1
@@ -139,7 +140,7 @@ def recall(S: Stepping, h: float) -> None:
         begin = end
     for k in range(count):
         row = P.was[k]
-        P.r[k, 0] = P.r[k, 1] = P.r[k, 2] = 0.0
+        P.r[k, 0] = P.r[k, 1] = P.r[k, 2] = P.slides[k] = 0.0
         if row < 0:
             continue
         f = vector(kept.table[row, KEPT_FORCE:])
@@ -157,7 +158,7 @@ def share_sticking(S: Stepping) -> None:
 
     How they share it is not determined.
     """
-    kept, begin = S.kept, 0
+    kept, begin = S.kept, S.kept.count[SLEEPING_ROWS]
     while begin < kept.count[0]:
         end, most, total = begin, 0.0, (0.0, 0.0, 0.0)
         while end < kept.count[0] and kept.key[end] == kept.key[begin]:
@@ -177,7 +178,7 @@ def keep_points(scene: Scene, S: Stepping) -> None:
     """Keep the points that press in the step that is taken."""
     P, kept, M = S.points, S.kept, S.motion
     h = S.tally.number[STEP_LENGTH]
-    row = 0
+    row = kept.count[SLEEPING_ROWS]
     for k in range(S.tally.count[POINTS]):
         if P.r[k, 0] == 0.0:
             continue
@@ -193,8 +194,7 @@ def keep_points(scene: Scene, S: Stepping) -> None:
         values[KEPT_BODY_I], values[KEPT_BODY_J] = scene.graphics.body[gi], scene.graphics.body[gj]
         values[KEPT_GAP], values[KEPT_CLOSING] = P.gap[k], -P.closing[k]
         values[KEPT_WEIGHT] = scene.work.points[s, AT_WEIGHT]
-        i, j = P.body[k, 0], P.body[k, 1]
-        x, z = velocity_of(P.H, k, 1, M.v, i, j), velocity_of(P.H, k, 2, M.v, i, j)
+        x, z = velocity_of(P, k, 1, M.v), velocity_of(P, k, 2, M.v)
         values[KEPT_SLIP] = (x * x + z * z) ** 0.5
         # see `share_sticking`
         values[KEPT_STICKS] = P.mu[k]

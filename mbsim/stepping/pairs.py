@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import ACTIVE, NARROWPHASE, SKIPPED, WANTED
+from mbsim.arrays.codes import ACTIVE, LISTINGS, NARROWPHASE, SKIPPED, WANTED
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
@@ -19,8 +19,31 @@ from mbsim.core.rotation import norm, vector
 from mbsim.dynamics.bodies.kinematics import place_graphics
 from mbsim.dynamics.contact.detection import measure_pair
 from mbsim.stepping.ahead import look_ahead_of, meets_after_all
-from mbsim.stepping.arrays import POINTS, SOME_AHEAD, Stepping
+from mbsim.stepping.arrays import ASLEEP, POINTS, SOME_AHEAD, Stepping
 from mbsim.stepping.points import deepest_of, fill_reach, take_rows
+from mbsim.stepping.sleep import both_sleep, one_sleeps, wake
+
+
+@jitable
+def lies_still(scene: Scene, S: Stepping, pair: int) -> bool:
+    """Return whether a pair's shapes did not move since its rows were measured, in this list."""
+    pairs, travel = scene.pairs, scene.work.travel
+    if S.motion.measured[pair] != scene.log.counters[LISTINGS]:
+        return False
+    since = pairs.gap[pair] - pairs.left[pair]
+    since += travel[pairs.graphic_i[pair]] + travel[pairs.graphic_j[pair]]
+    return since == 0.0
+
+
+@jitable
+def meets_sleeper(scene: Scene, S: Stepping, pair: int, reach: float, committed: bool) -> bool:
+    """Return whether a pair of which one body sleeps may close as far as `reach`."""
+    measure_pair(scene, pair)
+    depth = deepest_of(scene, S, pair)
+    S.motion.measured[pair] = -1
+    if committed:
+        scene.pairs.gap[pair] = scene.pairs.left[pair] = -depth
+    return -depth <= reach
 
 
 @jitable
@@ -43,18 +66,33 @@ def find_points(scene: Scene, S: Stepping, y: F1, h: float, committed: bool) -> 
     for k in range(pairs.count[ACTIVE]):
         pair = pairs.active[k]
         gi, gj = pairs.graphic_i[pair], pairs.graphic_j[pair]
+        i, j = scene.graphics.body[gi], scene.graphics.body[gj]
+        if both_sleep(S, i, j):
+            continue
         reach = S.motion.reach[gi] + S.motion.reach[gj]
         if pairs.left[pair] - work.travel[gi] - work.travel[gj] > reach:
             continue
-        measured += 1
-        measure_pair(scene, pair)
-        depth = deepest_of(scene, S, pair)
-        if committed:
-            pairs.gap[pair] = pairs.left[pair] = -depth
-        if S.plan.near[pairs.kind[pair]] == 1:
+        if one_sleeps(S, i, j):
+            measured += 1
+            if meets_sleeper(scene, S, pair, reach, committed):
+                wake(S, i if S.rest.body[i, ASLEEP] == 1 else j)
+            continue
+        near = S.plan.near[pairs.kind[pair]] == 1
+        if near and lies_still(scene, S, pair):
             room = take_rows(scene, S, y, pair, (-math.inf, reach))
         else:
-            room = look_ahead_of(scene, S, y, pair, h, depth)
+            measured += 1
+            measure_pair(scene, pair)
+            depth = deepest_of(scene, S, pair)
+            M.measured[pair] = -1
+            if committed:
+                pairs.gap[pair] = pairs.left[pair] = -depth
+                if near and work.beyond[scene.kinds.contact[pairs.kind[pair]]] == 0:
+                    M.measured[pair] = log.counters[LISTINGS]
+            if near:
+                room = take_rows(scene, S, y, pair, (-math.inf, reach))
+            else:
+                room = look_ahead_of(scene, S, y, pair, h, depth)
         if not room:
             return Code.NO_ROOM
     log.counters[NARROWPHASE] += measured
@@ -87,11 +125,17 @@ def find_missed(scene: Scene, S: Stepping, y: F1, h: float) -> int:
     for k in range(pairs.count[ACTIVE]):
         pair = pairs.active[k]
         gi, gj = pairs.graphic_i[pair], pairs.graphic_j[pair]
+        i, j = scene.graphics.body[gi], scene.graphics.body[gj]
+        if both_sleep(S, i, j):
+            continue
         went = M.went[gi] + M.went[gj]
         if pairs.left[pair] - work.travel[gi] - work.travel[gj] > went:
             continue
         room = True
-        if S.plan.near[pairs.kind[pair]] == 1:
+        if one_sleeps(S, i, j):
+            if meets_sleeper(scene, S, pair, went, False):
+                wake(S, i if S.rest.body[i, ASLEEP] == 1 else j)
+        elif S.plan.near[pairs.kind[pair]] == 1:
             reach = M.reach[gi] + M.reach[gj]
             if went > reach:
                 measure_pair(scene, pair)

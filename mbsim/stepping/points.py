@@ -7,20 +7,32 @@ import math
 from mbsim.arrays.hooks import Hook, Joints, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
-from mbsim.core.arrays import F1, F3, V3
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import any_tangent, cross, dot, norm, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.forces import IGNORE_DEEPER, sides
 from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT
-from mbsim.stepping.arrays import POINTS, Stepping
+from mbsim.stepping.arrays import (
+    AXES,
+    LIGHT,
+    POINTS,
+    SPIN,
+    TURN,
+    W_NN,
+    W_NX,
+    W_NZ,
+    W_XX,
+    W_XZ,
+    W_ZZ,
+    Stepping,
+)
+from mbsim.stepping.one_point import alone, answer_of, direction, fill_inverse, velocity_of
 
 #: Part of a step's motion by which pairs are looked for beyond it: others may hit what moves.
 AHEAD = 0.5
 #: Weights below this are no point.
 LEAST = 1e-6
-#: A determinant is none below this part of the product of a matrix' diagonal.
-SINGULAR = 1e-12
 
 
 @jitable
@@ -117,28 +129,23 @@ def take_rows(scene: Scene, S: Stepping, y: F1, pair: int, within: tuple[float, 
 
 
 @jitable
-def put_side(scene: Scene, S: Stepping, k: int, side: int, axes: tuple[V3, V3, V3]) -> None:
-    """Fill H, and what impulses do, of one body of point k; `axes` are n, x, y or less them."""
-    P, b = S.points, S.points.body[k, side]
-    H, answer = P.H[k, side], P.answer[k, side]
+def put_side(scene: Scene, S: Stepping, k: int, side: int) -> None:
+    """Fill what point k does to one of its bodies, and how that turns it."""
+    P, b, row = S.points, S.points.body[k, side], S.points.given[k]
+    at, to = TURN + 9 * side, SPIN + 9 * side
     if b == len(scene.bodies.mass):
-        for a in range(3):
-            for c in range(6):
-                H[a, c] = answer[a, c] = 0.0
+        for c in range(9):
+            row[at + c] = row[to + c] = 0.0
+        row[LIGHT + side] = 0.0
         return
-    arm = vector(P.arm[k, side])
+    inverse, arm = S.motion.inverse[b], vector(P.arm[k, side])
+    row[LIGHT + side] = inverse[0, 0]
+    x, y, z = vector(inverse[3], 3), vector(inverse[4], 3), vector(inverse[5], 3)
     for a in range(3):
-        turn = cross(arm, axes[a])
-        for c in range(3):
-            H[a, c], H[a, 3 + c] = axes[a][c], turn[c]
-    inverse = S.motion.inverse[b]
-    for a in range(3):
-        for c in range(3):
-            answer[a, c] = inverse[c, c] * H[a, c]
-            total = 0.0
-            for d in range(3, 6):
-                total += inverse[3 + c, d] * H[a, d]
-            answer[a, 3 + c] = total
+        turn = cross(arm, vector(row, AXES + 3 * a))
+        i, j = at + 3 * a, to + 3 * a
+        row[i], row[i + 1], row[i + 2] = turn[0], turn[1], turn[2]
+        row[j], row[j + 1], row[j + 2] = dot(x, turn), dot(y, turn), dot(z, turn)
 
 
 @jitable
@@ -194,7 +201,7 @@ def widen(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
             b = P.body[k, side]
             if plan.group[b] >= 0:
                 for c in range(6):
-                    impulse[6 * b + c] += P.H[k, side, a, c]
+                    impulse[6 * b + c] += direction(P, k, side, a, c)
         joints = scene.world.hooks[Hook.JOINTS]
         note_failure(scene, call_int(joints, (scene, Joints.IMPULSE, 0.0, impulse, impulse)))
         for row in range(begin, begin + P.many[k]):
@@ -202,59 +209,35 @@ def widen(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
             side = 0 if b == P.body[k, 0] else 1
             for c in range(6):
                 held = plan.group[b] >= 0
-                P.moves[row, c, a] = impulse[6 * b + c] if held else P.answer[k, side, a, c]
-    # what its own bodies do
-    for row in range(begin, begin + P.many[k]):
-        for side in range(2):
-            if P.moved[row] == P.body[k, side]:
-                for c in range(6):
-                    for a in range(3):
-                        P.answer[k, side, a, c] = P.moves[row, c, a]
+                P.moves[row, c, a] = impulse[6 * b + c] if held else alone(P, k, side, a, c)
     return True
 
 
 @jitable
-def invert(A: F3, out: F3, k: int) -> None:
-    """Write the inverse of the 3 x 3 matrix A[k], 0 where it has none to speak of."""
-    a, b, c = vector(A[k, 0]), vector(A[k, 1]), vector(A[k, 2])
-    x, y, z = cross(b, c), cross(c, a), cross(a, b)
-    determinant = dot(a, x)
-    some = determinant > SINGULAR * A[k, 0, 0] * A[k, 1, 1] * A[k, 2, 2]
-    part = 1.0 / determinant if some else 0.0
-    for row in range(3):
-        out[k, row, 0], out[k, row, 1], out[k, row, 2] = part * x[row], part * y[row], part * z[row]
-
-
-@jitable
 def fill_point(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
-    """Fill H, the answers to impulses, W and the closing speed of point k; False if no room.
+    """Fill what the solver reads of point k, and its closing speed; False if no room.
 
     `begin` is the first of the wide rows that are not in use.
     """
-    P, M = S.points, S.motion
+    P, row = S.points, S.points.given[k]
     n, x = vector(P.normal[k]), vector(P.tangent[k])
     z = cross(n, x)
-    put_side(scene, S, k, 0, (n, x, z))
-    put_side(
-        scene,
-        S,
-        k,
-        1,
-        ((-n[0], -n[1], -n[2]), (-x[0], -x[1], -x[2]), (-z[0], -z[1], -z[2])),
-    )
+    for c in range(3):
+        row[AXES + c], row[AXES + 3 + c], row[AXES + 6 + c] = n[c], x[c], z[c]
+    put_side(scene, S, k, 0)
+    put_side(scene, S, k, 1)
     if not widen(scene, S, k, begin):
         return False
-    i, j = P.body[k, 0], P.body[k, 1]
-    for a in range(3):
-        for c in range(3):
-            total = 0.0
-            for d in range(6):
-                total += P.H[k, 0, a, d] * P.answer[k, 0, c, d]
-                total += P.H[k, 1, a, d] * P.answer[k, 1, c, d]
-            P.W[k, a, c] = total
-    invert(P.W, P.stops, k)
-    u = 0.0
-    for d in range(6):
-        u += P.H[k, 0, 0, d] * M.before[i, d] + P.H[k, 1, 0, d] * M.before[j, d]
-    P.closing[k] = u
+    row[W_NN], row[W_NX], row[W_NZ] = (
+        answer_of(P, k, 0, 0),
+        answer_of(P, k, 0, 1),
+        answer_of(P, k, 0, 2),
+    )
+    row[W_XX], row[W_XZ], row[W_ZZ] = (
+        answer_of(P, k, 1, 1),
+        answer_of(P, k, 1, 2),
+        answer_of(P, k, 2, 2),
+    )
+    fill_inverse(row)
+    P.closing[k] = velocity_of(P, k, 0, S.motion.before)
     return True

@@ -60,6 +60,7 @@ from mbsim.stepping.arrays import (
     KEPT_TANGENT,
     KEPT_WEIGHT,
     POINTS,
+    SLEEPING_ROWS,
     STEP_LENGTH,
     Stepping,
 )
@@ -113,7 +114,7 @@ def keep_step(scene: Scene, S: Stepping, t: float, h: float) -> None:
         log[TOUCHES] += 1.0
         log[APPROACH] = speed
         record(scene, when, TOUCH, c, P.slot[k])
-    for row in range(kept.count[0]):
+    for row in range(kept.count[SLEEPING_ROWS], kept.count[0]):
         values = kept.table[row]
         if values[KEPT_STAYS] == 0.0:
             record(scene, first, LEAVE, int(values[KEPT_CONTACT]), int(values[KEPT_SLOT]))

@@ -22,12 +22,15 @@ from mbsim.stepping.arrays import (
     LEFT,
     LEFT_PART,
     LEFT_SPEED,
+    MAY_SLEEP,
     NEAR,
     NEWTONS,
+    NOISE,
     OWN_TIME,
     PLAN_NUMBERS,
     PROJECTED,
     PUSH_SPEED,
+    SLEEPERS,
     SLOP,
     SOME_AHEAD,
     UNSOLVED,
@@ -85,8 +88,9 @@ POINTS_EACH = 64
 #: Velocities of bodies that joints hold, by impulses of all points, are at most so many.
 MOST_WIDE = 200_000
 #: A gap, or what a position changes by, counts from this part of tol L on; what the solver may
-#: leave of a velocity is that part of tol L / h.
-COUNTS, LEAVES = 0.1, 3e-3
+#: leave of a velocity is that part of tol L / h: more where steps are as long as the deck says, for
+#: they are off by more; closing and slipping by a part of tol L in a step are none.
+COUNTS, LEAVES, LEAVES_OF_FIXED, NONE_BELOW = 0.1, 3e-3, 3e-2, 0.09
 #: Part of what an impact changes of a velocity that the solver may leave, over tol, and at most.
 JUMPS, MOST_JUMPS = 10.0, 0.05
 
@@ -109,6 +113,7 @@ class Made(NamedTuple):
             "contact_unsolved": int(count[UNSOLVED]),
             "contact_projections": int(count[PROJECTED]),
             "contact_points": int(count[ALL_POINTS]),
+            "asleep_at_end": int(self.stepping.rest.count[SLEEPERS]),
         }
 
 
@@ -116,7 +121,7 @@ def _plan(system: System, fixed: bool, tol: float) -> Plan:
     """Return what holds for the run, and let pairs be measured where they are apart too."""
     from mbsim.compile_model.contacts import near_address, pair_address
 
-    kinds, scene = system.plans.kinds, system.scene
+    kinds, scene, model = system.plans.kinds, system.scene, system.model
     near, rows = (np.zeros(len(kinds), dtype=np.int64) for _ in range(2))
     for k, kind in enumerate(kinds):
         rows[k] = kind.slots - (REGION_ROWS if kind.region else 0)
@@ -135,7 +140,11 @@ def _plan(system: System, fixed: bool, tol: float) -> Plan:
     number[LEFT_PART] = min(JUMPS * tol, MOST_JUMPS)
     number[OWN_TIME] = length / number[PUSH_SPEED]
     number[NEAR] = tol * number[OWN_TIME]
-    number[SLOP], number[LEFT] = COUNTS * tol * length, LEAVES * tol * length
+    number[SLOP], number[NOISE] = COUNTS * tol * length, NONE_BELOW * tol * length
+    number[LEFT] = (LEAVES_OF_FIXED if fixed else LEAVES) * tol * length
+    sources = [model.transient, *(simulation.transient for simulation in model.simulations)]
+    awake = any(source is not None and source.sleep is False for source in sources)
+    number[MAY_SLEEP] = float(not awake)
     return Plan(number, near, rows, group, members, first)
 
 
@@ -202,7 +211,7 @@ def rigid_mechanism(system: System, fixed: bool, tol: float) -> Made:
     largest = int(np.diff(plan.first).max(initial=0))
     wide = min(capacity * 2 * largest, MOST_WIDE) if largest > 0 else 1
     ng, ny = len(scene.graphics.body), scene.rows.y.shape[1]
-    sizes = nb, ng, ny, capacity, len(scene.pairs.kind), wide
+    sizes = nb, ng, ny, capacity, len(scene.pairs.kind), wide, len(scene.audit.sums)
     stepping = make(found.rules, plan, sizes)
     inner, outer = pack(stepping), pack(scene)
     scene.world.hooks[Hook.STEPPING] = int(inner.ctypes.data)

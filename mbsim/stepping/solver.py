@@ -7,7 +7,7 @@ With v the velocities of the bodies, u = H v at a contact point and r its impuls
     0 <= r_n  _|_  u_n + ahead >= 0,    |r_t| <= mu r_n, against u_t where that slips
 
 block Gauss-Seidel goes through the points and solves each one exactly
-(`fclib.one_contact`), the others' impulses being as they are; v follows at once, so nothing is
+(`stepping.one_point`), the others' impulses being as they are; v follows at once, so nothing is
 assembled. Source: V. Acary, B. Brogliato, Numerical Methods for Nonsmooth Dynamical Systems (2008),
 section 13.7. What sweeps leave, Newton's method on the same arrays finishes (`fclib.bodies`).
 """
@@ -18,11 +18,11 @@ import math
 
 import numpy as np
 
-from mbsim.core.arrays import F2, F4, V3
+from mbsim.core.arrays import F2, I1
 from mbsim.core.jitable import jitable
 from mbsim.fclib.bodies.solve import solve_contacts
-from mbsim.fclib.one_contact import contact_3d
-from mbsim.stepping.arrays import Motion, Points
+from mbsim.stepping.arrays import ALONG, W_NN, W_XX, W_ZZ, Motion, Points
+from mbsim.stepping.one_point import apply, directions, solve_point, velocity_of
 
 #: Sweeps before Newton's method, and behind it, at most.
 FEW_SWEEPS, MOST_SWEEPS = 40, 400
@@ -32,6 +32,10 @@ LOOKS = 8
 MOST_LEFT = 10.0
 #: How often the points of a pair are solved in one sweep at most.
 MOST_ROUNDS = 5
+#: A single point may be left so many times worse than the mean of them.
+WORST = 5.0
+#: A velocity that changes by less than this part of what may be left asks no other pair.
+STILL = 0.25
 #: Points up to which Newton's method finishes: of large piles a step's factors cost more than
 #: sweeps bring, and warm starts go on from step to step.
 NEWTON_POINTS = 300
@@ -40,96 +44,80 @@ NEWTONS, SHARPEST = 40, 1e-13
 
 
 @jitable
-def velocity_of(H: F4, k: int, a: int, v: F2, i: int, j: int) -> float:
-    """Return component a of u at point k."""
-    # four sums that do not wait for each other
-    x = H[k, 0, a, 0] * v[i, 0] + H[k, 0, a, 1] * v[i, 1] + H[k, 0, a, 2] * v[i, 2]
-    y = H[k, 0, a, 3] * v[i, 3] + H[k, 0, a, 4] * v[i, 4] + H[k, 0, a, 5] * v[i, 5]
-    z = H[k, 1, a, 0] * v[j, 0] + H[k, 1, a, 1] * v[j, 1] + H[k, 1, a, 2] * v[j, 2]
-    w = H[k, 1, a, 3] * v[j, 3] + H[k, 1, a, 4] * v[j, 4] + H[k, 1, a, 5] * v[j, 5]
-    return (x + y) + (z + w)
+def solve_pair(p: Points, v: F2, begin: int, end: int) -> tuple[float, float]:
+    """Solve points of one pair in turn.
 
-
-@jitable
-def apply(p: Points, k: int, v: F2, r: V3) -> None:
-    """Add what an impulse at point k does to the velocities of the bodies that it moves."""
-    if p.wide[k] >= 0:
-        for row in range(p.wide[k], p.wide[k] + p.many[k]):
-            b, moves = p.moved[row], p.moves[row]
-            for c in range(6):
-                v[b, c] += moves[c, 0] * r[0] + moves[c, 1] * r[1] + moves[c, 2] * r[2]
-        return
-    i, j, answer = p.body[k, 0], p.body[k, 1], p.answer
-    for c in range(6):
-        v[i, c] += answer[k, 0, 0, c] * r[0] + answer[k, 0, 1, c] * r[1] + answer[k, 0, 2, c] * r[2]
-    for c in range(6):
-        v[j, c] += answer[k, 1, 0, c] * r[0] + answer[k, 1, 1, c] * r[1] + answer[k, 1, 2, c] * r[2]
-
-
-@jitable
-def solve_point(p: Points, v: F2, k: int) -> float:
-    """Let point k obey its law; return by how much that changes its velocity."""
-    H, W, r = p.H, p.W, p.r
-    i, j = p.body[k, 0], p.body[k, 1]
-    un = velocity_of(H, k, 0, v, i, j) + p.ahead[k]
-    rn, rx, ry = r[k, 0], r[k, 1], r[k, 2]
-    if un >= 0.0 and rn == 0.0 and rx == 0.0 and ry == 0.0:
-        return 0.0
-    ux, uy = velocity_of(H, k, 1, v, i, j), velocity_of(H, k, 2, v, i, j)
-    # what brings it to rest: r - W^-1 u
-    sn = rn - (p.stops[k, 0, 0] * un + p.stops[k, 0, 1] * ux + p.stops[k, 0, 2] * uy)
-    sx = rx - (p.stops[k, 1, 0] * un + p.stops[k, 1, 1] * ux + p.stops[k, 1, 2] * uy)
-    sy = ry - (p.stops[k, 2, 0] * un + p.stops[k, 2, 1] * ux + p.stops[k, 2, 2] * uy)
-    most = p.mu[k] * sn
-    bn = un - (W[k, 0, 0] * rn + W[k, 0, 1] * rx + W[k, 0, 2] * ry)
-    if bn < 0.0 and sn >= 0.0 and sx * sx + sy * sy <= most * most and p.stops[k, 0, 0] > 0.0:
-        dn, dx, dy = sn - rn, sx - rx, sy - ry
-        r[k, 0], r[k, 1], r[k, 2] = sn, sx, sy
-        apply(p, k, v, (dn, dx, dy))
-        return max(W[k, 0, 0] * abs(dn), max(W[k, 1, 1] * abs(dx), W[k, 2, 2] * abs(dy)))
-    bx = ux - (W[k, 1, 0] * rn + W[k, 1, 1] * rx + W[k, 1, 2] * ry)
-    by = uy - (W[k, 2, 0] * rn + W[k, 2, 1] * rx + W[k, 2, 2] * ry)
-    sn, sx, sy = contact_3d(W, k, bn, bx, by, p.mu[k], rn, rx, ry)
-    dn, dx, dy = sn - rn, sx - rx, sy - ry
-    if dn == 0.0 and dx == 0.0 and dy == 0.0:
-        return 0.0
-    r[k, 0], r[k, 1], r[k, 2] = sn, sx, sy
-    apply(p, k, v, (dn, dx, dy))
-    return max(W[k, 0, 0] * abs(dn), max(W[k, 1, 1] * abs(dx), W[k, 2, 2] * abs(dy)))
-
-
-@jitable
-def solve_pair(p: Points, v: F2, begin: int, end: int) -> float:
-    """Solve points of one pair in turn; return the largest change over what may be left."""
-    largest = 0.0
+    Return the largest change over what may be left, and the sum of their squares.
+    """
+    largest, square = 0.0, 0.0
     for k in range(begin, end):
         change = solve_point(p, v, k) * p.counts[k]
+        square += change * change
         if not change <= largest:
             largest = change
-    return largest
+    return largest, square
 
 
 @jitable
-def sweep(p: Points, v: F2, count: int) -> float:
-    """Go once through the pairs; return the largest change of a velocity over what may be left.
+def pressing(p: Points, count: int) -> int:
+    """Return how many points press."""
+    some = 0
+    for k in range(count):
+        some += 1 if p.r[k, 0] > 0.0 else 0
+    return some
 
-    Points of one pair are solved a few times in turn: they bear on each other most, as corners of
-    a face do.
+
+@jitable
+def note_change(p: Points, changed: I1, k: int, number: int) -> None:
+    """Note that sweep `number` changed the bodies that point k moves; ground never changes."""
+    if p.wide[k] >= 0:
+        for row in range(p.wide[k], p.wide[k] + p.many[k]):
+            changed[p.moved[row]] = number
+        return
+    ground = len(changed) - 1
+    for side in range(2):
+        if p.body[k, side] != ground:
+            changed[p.body[k, side]] = number
+
+
+@jitable
+def change_all(changed: I1, number: int) -> None:
+    """Let sweep `number + 1` go to every pair."""
+    for b in range(len(changed) - 1):
+        changed[b] = number
+
+
+@jitable
+def sweep(p: Points, M: Motion, count: int, number: int) -> tuple[float, float]:
+    """Go through the pairs whose bodies sweep `number - 1` changed, or this one before.
+
+    Return the largest change of a velocity over what may be left, and the square mean over points
+    that press. What changes by less than `STILL` of that wakes nobody: a sweep of all pairs has the
+    last word (`sweep_on`). Points of one pair are solved a few times in turn: they bear on each
+    other most, as corners of a face do.
     """
-    largest, begin = 0.0, 0
+    largest, square, begin, changed = 0.0, 0.0, 0, M.changed
     while begin < count:
         end = begin + 1
         while end < count and p.key[end] == p.key[begin]:
             end += 1
-        first = solve_pair(p, v, begin, end)
-        if not first <= largest:
-            largest = first
-        rounds, left = 1, first
-        while end > begin + 1 and 1.0 < left < math.inf and rounds < MOST_ROUNDS:
-            left = solve_pair(p, v, begin, end)
-            rounds += 1
+        i, j = p.body[begin, 0], p.body[begin, 1]
+        if changed[i] >= number - 1 or changed[j] >= number - 1:
+            first, more = solve_pair(p, M.v, begin, end)
+            square += more
+            if not first <= largest:
+                largest = first
+            rounds, left = 1, first
+            while end > begin + 1 and 1.0 < left < math.inf and rounds < MOST_ROUNDS:
+                left = solve_pair(p, M.v, begin, end)[0]
+                rounds += 1
+            if not first <= STILL:
+                for k in range(begin, end):
+                    note_change(p, changed, k, number)
+                    if p.wide[k] < 0:
+                        break
         begin = end
-    return largest
+    return largest, math.sqrt(square / max(pressing(p, count), 1))
 
 
 @jitable
@@ -155,62 +143,79 @@ def gradient(p: Points, count: int) -> float:
     """Return the square of what the last sweep changed of the impulses, in the norm of W."""
     square = 0.0
     for k in range(count):
-        for a in range(3):
-            square += p.W[k, a, a] * (p.r[k, a] - p.old[k, a]) ** 2
+        r, old, row = p.r[k], p.old[k], p.given[k]
+        x, y, z = r[0] - old[0], r[1] - old[1], r[2] - old[2]
+        if x != 0.0 or y != 0.0 or z != 0.0:
+            square += row[W_NN] * x * x + row[W_XX] * y * y + row[W_ZZ] * z * z
     return square
 
 
 @jitable
-def go_on(p: Points, v: F2, count: int, part: float) -> None:
-    """Go on along the way of the sweeps before: a part of it, and let the way be that of all."""
+def go_on(p: Points, M: Motion, count: int, part: float, number: int) -> None:
+    """Go on along the way of the sweeps before: a part of it, and let the way be that of all.
+
+    The way of points that the last sweep left as they were ends.
+    """
     for k in range(count):
-        if part > 0.0:
-            d = (part * p.way[k, 0], part * p.way[k, 1], part * p.way[k, 2])
-            for a in range(3):
-                p.way[k, a] = d[a] + p.r[k, a] - p.old[k, a]
-                p.r[k, a] += d[a]
-            apply(p, k, v, d)
+        r, old, way, row = p.r[k], p.old[k], p.way[k], p.given[k]
+        x, y, z = r[0] - old[0], r[1] - old[1], r[2] - old[2]
+        if part < 0.0 or (x == 0.0 and y == 0.0 and z == 0.0):
+            way[0] = way[1] = way[2] = 0.0
+        elif part == 0.0:
+            way[0], way[1], way[2] = x, y, z
         else:
-            for a in range(3):
-                p.way[k, a] = p.r[k, a] - p.old[k, a] if part == 0.0 else 0.0
-        for a in range(3):
-            p.old[k, a] = p.r[k, a]
+            d = (part * way[0], part * way[1], part * way[2])
+            way[0], way[1], way[2] = d[0] + x, d[1] + y, d[2] + z
+            r[0] += d[0]
+            r[1] += d[1]
+            r[2] += d[2]
+            apply(p, k, M.v, d)
+            across = max(row[W_XX] * abs(d[1]), row[W_ZZ] * abs(d[2]))
+            if max(row[W_NN] * abs(d[0]), across) * p.counts[k] > STILL:
+                note_change(p, M.changed, k, number)
+        old[0], old[1], old[2] = r[0], r[1], r[2]
 
 
 @jitable
 def sweep_on(
     p: Points, M: Motion, count: int, allowed: tuple[float, float], most: int
-) -> tuple[float, int]:
-    """Improve r and v of `count` points; return what a sweep still changes, sweeps.
+) -> tuple[float, int, bool]:
+    """Improve r and v of `count` points; return what a sweep still changes, sweeps, if solved.
 
     That is of a velocity, over what may be left of it: `allowed` and a part of jumps. Sweeps end
-    where it is less than 1, or with `most`. Between them
+    where one of all pairs changes less than 1 in the square mean over what presses, and nowhere
+    more than `WORST`; or with `most`. Between them
     impulses go on along the way of the sweeps before, as conjugate gradients do, which is dropped
     where a sweep changes more than the last one.
     Source: M. Silcowitz, S. Niebe, K. Erleben, A nonsmooth nonlinear conjugate gradient method for
     interactive contact force problems, The Visual Computer 26 (2010) 893.
     """
-    left, before, sweeps, v = 0.0, 0.0, 0, M.v
+    left, before, sweeps, whole, solved = 0.0, 0.0, 0, True, True
     for k in range(count):
         p.counts[k] = 1.0 / allowed[0]
         for a in range(3):
             p.old[k, a] = p.r[k, a]
+    change_all(M.changed, 0)
     while sweeps < most:
-        left = sweep(p, v, count)
         sweeps += 1
+        left, mean = sweep(p, M, count, sweeps)
         if sweeps % LOOKS == 1 and left > 1.0:
             let_jumps_count(p, M, count, allowed[0], allowed[1])
-        if left <= 1.0 or sweeps == most or not math.isfinite(left):
+        solved = left <= 1.0 or (left <= WORST and mean <= 1.0)
+        if (solved and whole) or sweeps == most or not math.isfinite(left):
             break
+        whole = solved or sweeps == most - 1
         square = gradient(p, count)
         part = -1.0
         if sweeps == 1:
             part = 0.0
         elif 0.0 < before and square <= before:
             part = square / before
-        go_on(p, v, count, part)
+        go_on(p, M, count, part, sweeps)
         before = square
-    return left, sweeps
+        if whole:
+            change_all(M.changed, sweeps)
+    return left, sweeps, solved
 
 
 @jitable
@@ -220,18 +225,19 @@ def finish(p: Points, M: Motion, ground: int, count: int, allowed: float) -> int
     It works on the same arrays (`fclib.bodies`), on the points that may press.
     """
     bodies, w = np.empty((count, 2), dtype=np.int64), np.empty((count, 3))
+    H = directions(p, count, ground)
     size = 0.0
     for k in range(count):
         i, j = p.body[k, 0], p.body[k, 1]
         bodies[k, 0], bodies[k, 1] = (-1 if i == ground else i), (-1 if j == ground else j)
         for a in range(3):
-            w[k, a] = velocity_of(p.H, k, a, M.free, i, j)
+            w[k, a] = velocity_of(p, k, a, M.free)
         w[k, 0] += p.ahead[k]
         for a in range(3):
             size += w[k, a] ** 2
     tol = min(max(0.05 * allowed / max(math.sqrt(size), 1e-300), SHARPEST), 1e-3)
     r = p.r[:count].copy()
-    found = solve_contacts(M.inverse, bodies, p.H[:count], p.mu[:count], w, r, tol, 0, NEWTONS)
+    found = solve_contacts(M.inverse, bodies, H, p.mu[:count], w, r, tol, 0, NEWTONS)
     for k in range(count):
         if not math.isfinite(r[k, 0] + r[k, 1] + r[k, 2]):
             return found[4]
@@ -265,26 +271,27 @@ def some_wide(p: Points, count: int) -> bool:
 @jitable
 def solve_points(
     p: Points, M: Motion, ground: int, count: int, allowed: tuple[float, float]
-) -> tuple[float, int, int]:
-    """Solve `count` points; return what a sweep still changes, sweeps and Newtons: `sweep_on`.
+) -> tuple[float, int, int, bool]:
+    """Solve `count` points; return what a sweep still changes, sweeps, Newtons, if it is solved.
 
-    r and v are as a guess says: r of the last step, v with that. A few sweeps do where little
-    changed; Newton's method does what they leave, and sweeps what it leaves.
+    See `sweep_on`. r and v are as a guess says: r of the last step, v with that. A few sweeps do
+    where little changed; Newton's method does what they leave, and sweeps what it leaves.
     """
-    left, sweeps = sweep_on(p, M, count, allowed, FEW_SWEEPS)
-    if left <= 1.0:
-        return left, sweeps, 0
+    left, sweeps, solved = sweep_on(p, M, count, allowed, FEW_SWEEPS)
+    if solved:
+        return left, sweeps, 0, solved
     newtons = 0
     if not math.isfinite(left):
         begin_anew(p, M, count)
     elif count <= NEWTON_POINTS and not some_wide(p, count):
         newtons = finish(p, M, ground, count, allowed[0])
-    left, more = sweep_on(p, M, count, allowed, MOST_SWEEPS)
+    left, more, solved = sweep_on(p, M, count, allowed, MOST_SWEEPS)
     if not math.isfinite(left):
         begin_anew(p, M, count)
-        for _ in range(FEW_SWEEPS):
-            left = sweep(p, M.v, count)
-    return left, sweeps + more, newtons
+        change_all(M.changed, 0)
+        for number in range(1, FEW_SWEEPS + 1):
+            left = sweep(p, M, count, number)[0]
+    return left, sweeps + more, newtons, solved
 
 
 @jitable
@@ -303,14 +310,14 @@ def project_positions(p: Points, shift: F2, count: int, h: float, slop: float, m
         worst = 0.0
         for step in range(count):
             k = count - 1 - step if sweeps % 2 == 1 else step
-            i, j = p.body[k, 0], p.body[k, 1]
-            gap = max(p.gap[k], -most) + h * velocity_of(p.H, k, 0, shift, i, j)
+            gap = max(p.gap[k], -most) + h * velocity_of(p, k, 0, shift)
             if gap >= -0.5 * slop and p.push[k] == 0.0:
                 continue
-            wanted = p.push[k] - gap / (h * p.W[k, 0, 0]) if p.W[k, 0, 0] > 0.0 else 0.0
+            along = p.given[k, ALONG]
+            wanted = p.push[k] - gap * along / h if along > 0.0 else 0.0
             change = max(wanted, 0.0) - p.push[k]
             p.push[k] += change
             apply(p, k, shift, (change, 0.0, 0.0))
-            worst = max(worst, abs(change) * p.W[k, 0, 0] * h)
+            worst = max(worst, abs(change) * p.given[k, W_NN] * h)
         sweeps += 1
     return sweeps

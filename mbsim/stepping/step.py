@@ -43,6 +43,7 @@ from mbsim.stepping.arrays import (
     ALL_POINTS,
     ALL_STEPS,
     ALL_SWEEPS,
+    ASLEEP,
     FIXED,
     HIT,
     KEPT_STICKS,
@@ -58,6 +59,8 @@ from mbsim.stepping.arrays import (
     SLOWEST,
     STEP_LENGTH,
     UNSOLVED,
+    W_NN,
+    WOKEN,
     Stepping,
 )
 from mbsim.stepping.displacements import (
@@ -68,24 +71,22 @@ from mbsim.stepping.displacements import (
     spread_parts,
     velocities_jump,
 )
+from mbsim.stepping.energy import keep_left, left_by_forces, left_by_spins
 from mbsim.stepping.friction import (
-    NOISE,
     coefficient,
     keep_loads,
     left_near_yield,
     left_of,
     let_stick,
     let_yield,
+    noise_of,
 )
 from mbsim.stepping.kept import index_kept, recall
+from mbsim.stepping.one_point import apply, velocity_of
 from mbsim.stepping.pairs import find_missed, find_points
 from mbsim.stepping.points import fill_point, fill_reach, way_at
-from mbsim.stepping.solver import (
-    apply,
-    project_positions,
-    solve_points,
-    velocity_of,
-)
+from mbsim.stepping.sleep import wake_loaded
+from mbsim.stepping.solver import project_positions, solve_points
 
 #: Newton iterations for the spin of a body at most.
 MOST_SPINS = 12
@@ -211,6 +212,8 @@ def fill_motion(scene: Scene, S: Stepping, y: F1, h: float) -> None:
     """Fill velocities before the step and without contacts, and inverse masses."""
     M, bodies, dy = S.motion, scene.bodies, S.motion.slope
     for b in range(len(bodies.mass)):
+        if S.rest.body[b, ASLEEP] == 1:
+            continue
         at, R = BODY_SIZE * b, scene.work.R[b]
         before, free, inverse = M.before[b], M.free[b], M.inverse[b]
         w = vector(scene.work.w[b])
@@ -244,7 +247,7 @@ def look_ahead(S: Stepping, k: int, h: float) -> None:
     if P.was[k] >= 0 and 0.0 < gap <= S.plan.number[SLOP]:
         # it lies on: to follow what does not count would keep all that rests in motion
         gap = 0.0
-    free = velocity_of(P.H, k, 0, M.free, P.body[k, 0], P.body[k, 1])
+    free = velocity_of(P, k, 0, M.free)
     P.ahead[k] = max(gap, 0.0) / h
     P.part[k] = NO_IMPACT
     mean = 0.5 * (before + free)
@@ -253,7 +256,7 @@ def look_ahead(S: Stepping, k: int, h: float) -> None:
         P.ahead[k] = max(P.ahead[k], -free)
         return
     part = meets_at(gap, h, before, free)
-    comes, slowest = before + part * (free - before), max(rule[SLOWEST], NOISE * left_of(S, h))
+    comes, slowest = before + part * (free - before), max(rule[SLOWEST], noise_of(S, h))
     if comes >= -slowest or (gap <= S.plan.number[SLOP] and before >= -slowest):
         return
     leaves = -rule[RESTITUTION] * comes + (1.0 - part) * (free - before)
@@ -277,11 +280,10 @@ def postpone(S: Stepping, count: int, h: float) -> bool:
         if P.gap[k] <= S.plan.number[SLOP]:
             continue
         # without its impulse
-        i, j = P.body[k, 0], P.body[k, 1]
-        u = velocity_of(P.H, k, 0, M.v, i, j)
+        u = velocity_of(P, k, 0, M.v)
         for a in range(3):
-            u -= P.W[k, 0, a] * P.r[k, a]
-        if u >= -max(rule[SLOWEST], NOISE * left_of(S, h)):
+            u -= P.given[k, W_NN + a] * P.r[k, a]
+        if u >= -max(rule[SLOWEST], noise_of(S, h)):
             continue
         apply(P, k, M.v, (-P.r[k, 0], -P.r[k, 1], -P.r[k, 2]))
         P.r[k, 0] = P.r[k, 1] = P.r[k, 2] = 0.0
@@ -304,10 +306,9 @@ def prepare_points(scene: Scene, S: Stepping, h: float) -> int:
         begin += P.many[k] if P.wide[k] >= 0 else 0
     recall(S, h)
     for k in range(count):
-        i, j = P.body[k, 0], P.body[k, 1]
-        x, z = velocity_of(P.H, k, 1, M.before, i, j), velocity_of(P.H, k, 2, M.before, i, j)
+        x, z = velocity_of(P, k, 1, M.before), velocity_of(P, k, 2, M.before)
         slip, row = math.sqrt(x * x + z * z), P.was[k]
-        if row >= 0 and slip <= NOISE * left_of(S, h):
+        if row >= 0 and slip <= noise_of(S, h):
             # what stuck moves by what the solver left of it
             slip = 0.0 if S.kept.table[row, KEPT_STICKS] == 1.0 else slip
         P.holds[k] = coefficient(S, P.contact[k], slip)
@@ -329,6 +330,16 @@ def start_impulses(S: Stepping, h: float, ground: int) -> None:
 
 
 @jitable
+def note_grounded(scene: Scene, S: Stepping, i: int, j: int) -> None:
+    """Note that ground presses on the group of a body, where one of two bodies is ground."""
+    nb, group = len(scene.bodies.mass), scene.scales.group
+    if i == nb and j < nb:
+        S.tally.grounded[group[j]] = 1
+    elif j == nb and i < nb:
+        S.tally.grounded[group[i]] = 1
+
+
+@jitable
 def add_losses(scene: Scene, S: Stepping, new: F1) -> None:
     """Add what contacts took: an impulse does its work at the mean of velocities."""
     P, M = S.points, S.motion
@@ -336,10 +347,14 @@ def add_losses(scene: Scene, S: Stepping, new: F1) -> None:
     for k in range(S.tally.count[POINTS]):
         if P.r[k, 0] == 0.0:
             continue
-        i, j, c = P.body[k, 0], P.body[k, 1], P.contact[k]
-        across = 0.0
+        c, across = P.contact[k], 0.0
+        note_grounded(scene, S, P.body[k, 0], P.body[k, 1])
         for a in range(3):
-            u = velocity_of(P.H, k, a, M.before, i, j) + velocity_of(P.H, k, a, M.v, i, j)
+            before = velocity_of(P, k, a, M.before)
+            u = before + velocity_of(P, k, a, M.v)
+            if P.part[k] != NO_IMPACT:
+                # velocities are those right before the impact and behind it
+                u += (2.0 * P.part[k] - 1.0) * (velocity_of(P, k, a, M.free) - before)
             new[first + c] -= 0.5 * P.r[k, a] * u
             across += 0.5 * P.r[k, a] * u if a > 0 else 0.0
         if scene.audit.friction_at[c] >= 0:
@@ -354,11 +369,11 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
     start_impulses(S, h, nb)
     slop = S.plan.number[SLOP]
     allowed = left_of(S, h)
-    left, sweeps, part = 0.0, 0, S.plan.number[LEFT_PART]
+    left, sweeps, part, solved = 0.0, 0, S.plan.number[LEFT_PART], True
     for k in range(count):
         P.mu[k] = P.holds[k]
     for _ in range(MOST_YIELDS if count > 0 else 0):
-        left, more, newtons = solve_points(P, M, nb, count, (allowed, part))
+        left, more, newtons, solved = solve_points(P, M, nb, count, (allowed, part))
         sweeps += more
         tally.count[NEWTONS] += newtons
         if not math.isfinite(left):
@@ -368,8 +383,9 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
             allowed = near
             continue
         changed = postpone(S, count, h)
-        changed = let_stick(S, count, NOISE * left_of(S, h)) or changed
-        if not let_yield(S, count, allowed) and not changed:
+        changed = let_stick(S, count, noise_of(S, h)) or changed
+        noise = noise_of(S, h) * allowed / left_of(S, h)
+        if not let_yield(S, count, noise) and not changed:
             break
     spread_parts(S, count, h, slop, nb)
     fill_shift(S, nb)
@@ -384,7 +400,7 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
     tally.count[ALL_SWEEPS] += sweeps
     tally.count[ALL_STEPS] += 1
     tally.count[ALL_POINTS] += count
-    tally.count[UNSOLVED] += 1 if left > 1.0 else 0
+    tally.count[UNSOLVED] += 0 if solved else 1
     tally.count[PROJECTED] += 1 if pushes > 1 else 0
     pressing = 0
     for k in range(count):
@@ -408,7 +424,8 @@ def solve_by_middle(scene: Scene, S: Stepping, t: float, h: float, y: F1, commit
             M.v[b, c] = 0.5 * (M.before[b, c] + M.v[b, c])
     move_bodies(scene, S, y, 0.5 * h, middle)
     code = find_forces(scene, t + 0.5 * h, middle, dy)
-    if code != 0:
+    wake_loaded(scene, S)
+    if code != 0 or S.rest.count[WOKEN] == 1:
         return code
     place_bodies(scene, y)
     fill_motion(scene, S, y, h)
@@ -429,6 +446,8 @@ def solve_all(scene: Scene, S: Stepping, t: float, h: float, y: F1, committed: b
             missed = find_missed(scene, S, y, h)
         if missed < 0:
             return -missed
+        if S.rest.count[WOKEN] == 1:
+            return 0
         if missed == 0:
             break
     if scene.world.hooks[Hook.APPLIED] != 0 or scene.world.hooks[Hook.JOINTS] != 0:
@@ -445,24 +464,30 @@ def take_step(
     if committed:
         for c in range(len(S.tally.deepest)):
             S.tally.deepest[c] = 0.0
-    code = find_forces(scene, t, y, dy)
-    if code != 0:
-        return code
-    fill_motion(scene, S, y, h)
-    if committed:
-        index_kept(S)
-        make_room(scene, S, y, h)
-    code = find_points(scene, S, y, h, committed)
-    if code != 0:
-        return code
-    code = solve_all(scene, S, t, h, y, committed)
-    if code != 0:
-        return code
+    S.rest.count[WOKEN] = 1
+    while S.rest.count[WOKEN] == 1:
+        # once more where something wakes: with all that is awake then
+        S.rest.count[WOKEN] = 0
+        code = find_forces(scene, t, y, dy)
+        if code != 0:
+            return code
+        wake_loaded(scene, S)
+        fill_motion(scene, S, y, h)
+        if committed:
+            index_kept(S)
+            make_room(scene, S, y, h)
+        code = find_points(scene, S, y, h, committed)
+        if code == 0 and S.rest.count[WOKEN] == 0:
+            code = solve_all(scene, S, t, h, y, committed)
+        if code != 0:
+            return code
     if S.plan.number[FIXED] == 0.0:
         keep_loads(S, S.tally.count[POINTS], committed)
     for k in range(BODY_SIZE * len(scene.bodies.mass), len(y)):
         new[k] = y[k] + h * dy[k]
+    left = left_by_forces(scene, S, h)
     move_bodies(scene, S, y, h, new)
+    keep_left(S, left + left_by_spins(scene, S, new), committed)
     if S.tally.count[PRESSING] > 0:
         add_losses(scene, S, new)
         # impulses may throw bodies farther than was looked for

@@ -1,0 +1,208 @@
+"""Bodies at rest: an island of them sleeps until something touches or loads one of them.
+
+An island is what contact points join, whether they press or not, but for ground. It sleeps where
+every body of it was still for `CALM` steps and a quarter of the model's own time: slower than what
+the solver may leave of a velocity (`friction.left_of`), nothing but weight acts on it, and no joint
+holds it. Its velocities are 0 then; its forces are those of its last step, which nothing changes.
+
+A sleeping body gives no contact points with what sleeps or is ground, so it is neither measured nor
+solved. As soon as a point of it with anything that is awake may close within a step, or a force
+beside its weight acts on it, its whole island is awake, before the step is solved: nothing is late.
+What would have moved on at less than what the solver may leave stands: that is the error.
+
+Kept points of what sleeps are the first rows of `Kept.table`, so that nobody goes through them.
+"""
+
+from __future__ import annotations
+
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1, I1
+from mbsim.core.jitable import jitable
+from mbsim.core.layout import AT_V, AT_W, BODY_SIZE
+from mbsim.core.rotation import norm, vector
+from mbsim.stepping.arrays import (
+    ASLEEP,
+    CALM_STEPS,
+    ISLAND,
+    KEPT_BODY_I,
+    KEPT_BODY_J,
+    MAY_SLEEP,
+    OWN_TIME,
+    POINTS,
+    QUIET,
+    SLEEPERS,
+    SLEEPING_ROWS,
+    WOKEN,
+    Stepping,
+)
+from mbsim.stepping.friction import left_of
+from mbsim.stepping.kept import index_kept
+
+#: Steps in a row in which a body has to be still, and for how long, over the model's own time L/V.
+CALM, LONG = 16, 0.25
+
+
+@jitable
+def both_sleep(S: Stepping, i: int, j: int) -> bool:
+    """Return whether two bodies sleep, or one does and the other one is ground."""
+    rest, ground = S.rest.body, len(S.rest.body)
+    first = i == ground or rest[i, ASLEEP] == 1
+    return first and (j == ground or rest[j, ASLEEP] == 1) and (i != ground or j != ground)
+
+
+@jitable
+def one_sleeps(S: Stepping, i: int, j: int) -> bool:
+    """Return whether one of two bodies sleeps, and the other one is awake and moves."""
+    rest, ground = S.rest.body, len(S.rest.body)
+    if i == ground or j == ground:
+        return False
+    return rest[i, ASLEEP] != rest[j, ASLEEP]
+
+
+@jitable
+def put_sleepers_first(S: Stepping) -> None:
+    """Put the kept points of what sleeps before all others; both keep their order."""
+    kept, at = S.kept, 0
+    for turn in range(2):
+        for row in range(kept.count[0]):
+            i, j = int(kept.table[row, KEPT_BODY_I]), int(kept.table[row, KEPT_BODY_J])
+            if both_sleep(S, i, j) == (turn == 0):
+                kept.spare_key[at] = kept.key[row]
+                for c in range(kept.table.shape[1]):
+                    kept.spare[at, c] = kept.table[row, c]
+                at += 1
+        if turn == 0:
+            kept.count[SLEEPING_ROWS] = at
+    for row in range(at):
+        kept.key[row] = kept.spare_key[row]
+        for c in range(kept.table.shape[1]):
+            kept.table[row, c] = kept.spare[row, c]
+    index_kept(S)
+
+
+@jitable
+def wake(S: Stepping, b: int) -> None:
+    """Wake the island of body b."""
+    rest, island = S.rest, S.rest.body[b, ISLAND]
+    for other in range(len(rest.body)):
+        row = rest.body[other]
+        if row[ASLEEP] == 1 and row[ISLAND] == island:
+            row[ASLEEP] = row[CALM_STEPS] = 0
+            rest.count[SLEEPERS] -= 1
+    rest.count[WOKEN] = 1
+    put_sleepers_first(S)
+
+
+@jitable
+def wake_all(S: Stepping) -> None:
+    """Wake everything, as where what acts is another from here on."""
+    for b in range(len(S.rest.body)):
+        S.rest.body[b, ASLEEP] = S.rest.body[b, CALM_STEPS] = 0
+    if S.rest.count[SLEEPERS] > 0:
+        S.rest.count[SLEEPERS] = 0
+        put_sleepers_first(S)
+
+
+@jitable
+def wake_loaded(scene: Scene, S: Stepping) -> None:
+    """Wake islands on a body of which anything but its weight acts."""
+    if S.rest.count[SLEEPERS] == 0:
+        return
+    for b in range(len(S.rest.body)):
+        if S.rest.body[b, ASLEEP] == 1 and is_loaded(scene, b):
+            wake(S, b)
+
+
+@jitable
+def is_loaded(scene: Scene, b: int) -> bool:
+    """Return whether anything but its weight acts on body b."""
+    work, mass, g = scene.work, scene.bodies.mass[b], scene.world.gravity
+    for c in range(3):
+        if work.force[b, c] != mass * g[c] or work.torque[b, c] != 0.0:
+            return True
+    return False
+
+
+@jitable
+def root_of(parent: I1, b: int) -> int:
+    """Return the first body of the island of body b, and shorten the way to it."""
+    while parent[b] != b:
+        parent[b] = parent[parent[b]]
+        b = parent[b]
+    return b
+
+
+@jitable
+def find_islands(S: Stepping) -> None:
+    """Fill the island of each body that is awake: its first body."""
+    P, parent, ground = S.points, S.rest.parent, len(S.rest.body)
+    for b in range(ground):
+        parent[b] = b
+    for k in range(S.tally.count[POINTS]):
+        i, j = P.body[k, 0], P.body[k, 1]
+        if i != ground and j != ground:
+            first, other = root_of(parent, i), root_of(parent, j)
+            parent[max(first, other)] = min(first, other)
+
+
+@jitable
+def count_calm(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> bool:
+    """Count the steps in which each body was still; return whether one was for long enough."""
+    some, slow = False, left_of(S, h)
+    for b in range(len(S.rest.body)):
+        row = S.rest.body[b]
+        if row[ASLEEP] == 1:
+            continue
+        at, length = BODY_SIZE * b, scene.scales.length[scene.scales.group[b]]
+        speed = norm(vector(y, at + AT_V)) + length * norm(vector(y, at + AT_W))
+        still = speed <= slow and S.plan.group[b] < 0 and not is_loaded(scene, b)
+        if not still:
+            row[CALM_STEPS] = 0
+            continue
+        if row[CALM_STEPS] == 0:
+            S.rest.since[b] = t
+        row[CALM_STEPS] += 1
+        some = some or is_calm(S, b, t)
+    return some
+
+
+@jitable
+def is_calm(S: Stepping, b: int, t: float) -> bool:
+    """Return whether a body was still for long enough."""
+    long = t - S.rest.since[b] >= LONG * S.plan.number[OWN_TIME]
+    return S.rest.body[b, CALM_STEPS] >= CALM and long
+
+
+@jitable
+def let_sleep(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> None:
+    """Let islands sleep whose bodies all are still, at the end of a step that is taken."""
+    if S.plan.number[MAY_SLEEP] == 0.0 or not count_calm(scene, S, t, h, y):
+        return
+    rest, parent = S.rest, S.rest.parent
+    find_islands(S)
+    # an island with one body that is not still is awake
+    for b in range(len(rest.body)):
+        rest.body[b, QUIET] = 1
+    for b in range(len(rest.body)):
+        if rest.body[b, ASLEEP] == 0 and not is_calm(S, b, t):
+            rest.body[root_of(parent, b), QUIET] = 0
+    some = False
+    for b in range(len(rest.body)):
+        row, first = rest.body[b], root_of(parent, b)
+        if row[ASLEEP] == 0 and rest.body[first, QUIET] == 1:
+            row[ASLEEP], row[ISLAND] = 1, first
+            rest.count[SLEEPERS] += 1
+            stop(S, y, b)
+            some = True
+    if some:
+        put_sleepers_first(S)
+
+
+@jitable
+def stop(S: Stepping, y: F1, b: int) -> None:
+    """Let body b have no velocity."""
+    M, at = S.motion, BODY_SIZE * b
+    for c in range(3):
+        y[at + AT_V + c] = y[at + AT_W + c] = 0.0
+    for c in range(6):
+        M.before[b, c] = M.free[b, c] = M.v[b, c] = M.shift[b, c] = 0.0

@@ -1,0 +1,90 @@
+"""MOREAU: what rests sleeps, costs nothing, and wakes in the step in which something happens."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mbsim
+from helpers import rigid_decks as decks
+from mbsim.bench import deck as text
+from mbsim.results.reading import Results
+
+#: A force along x on body 2 from 1 s on: the box slides from then.
+PUSH = (
+    '<Reference_Marker id="21" body_id="2" pos_z="0.1"/>'
+    '<Force_Vector_TwoBody id="401" type="ForceOnly" i_marker_id="21" j_floating_marker_id="12"'
+    ' ref_marker_id="12" fx_expression="IF(TIME-1:0,0,8)" fy_expression="0" fz_expression="0"/>'
+    '<Reference_Marker id="12" body_id="1"/>'
+)
+
+
+def run(folder: Path, parts: list[str], end: float, sleep: bool, h: float = 0.005) -> Results:
+    """Return a run by steps of h whose bodies may sleep, or not."""
+    decks.model(folder, parts, end, h)
+    deck = (folder / "rigid.xml").read_text()
+    said = "TRUE" if sleep else "FALSE"
+    deck = deck.replace("<Param_Transient ", f'<Param_Transient sleep="{said}" ')
+    return mbsim.simulate(deck, integrator="MOREAU", tol=1e-4)
+
+
+def standing(count: int) -> list[str]:
+    """Return touching cubes on each other, on the floor."""
+    ids = [100 * (2 + k) for k in range(count)]
+    cubes = [decks.cube(2 + k, 1.0, 0.2, (0.0, 0.0, 0.2 * k + 0.1)) for k in range(count)]
+    law = decks.rubbed(0.5)
+    both = [text.contact(301, ids, ids, **law), text.contact(302, ids, [100], **law)]
+    return [*cubes, *both, text.gravity()]
+
+
+def test_what_sleeps_takes_no_sweeps_and_keeps_its_forces(tmp_path: Path) -> None:
+    """Twice as long takes as many sweeps; the floor still carries all of it."""
+    short, long = (run(tmp_path, standing(5), end, True) for end in (1.0, 4.0))
+    assert long.stats["asleep_at_end"] == 5
+    assert long.stats["contact_sweeps"] == short.stats["contact_sweeps"]
+    assert long["contacts/302/force"][-1, 2] == pytest.approx(5.0 * 9.81, rel=1e-4)
+    for body in range(2, 7):
+        x = long[f"bodies/{body}/position"]
+        assert np.abs(x[-1] - x[0]).max() < 1e-4
+    awake = run(tmp_path, standing(5), 1.0, False)
+    assert awake.stats["asleep_at_end"] == 0
+    assert awake.stats["contact_sweeps"] >= awake.stats["contact_solves"]
+
+
+def test_what_is_hit_wakes_in_that_step(tmp_path: Path) -> None:
+    """A ball flies at a stack that sleeps: all goes as it does where nothing ever slept."""
+    ball = text.sphere(9, 2.0, 0.1, (-6.2, 0.0, 20.12), (3.0, 0.0, 0.0))
+    law = decks.rubbed(0.5)
+    hit = text.contact(303, [900], [200, 300, 400, 100], **law)
+    parts = [*standing(3), ball, hit]
+    sleeping, awake = run(tmp_path, parts, 2.1, True), run(tmp_path, parts, 2.1, False)
+    for body in (2, 3, 4, 9):
+        name = f"bodies/{body}/position"
+        assert np.abs(sleeping[name] - awake[name]).max() < 1e-4
+    # it did meet it, and pushed the uppermost one off its place
+    moved = awake["bodies/4/position"]
+    assert np.abs(moved[-1] - moved[0]).max() > 1e-2
+    assert sleeping.stats["contact_sweeps"] < awake.stats["contact_sweeps"]
+
+
+def test_what_is_loaded_wakes_in_that_step(tmp_path: Path) -> None:
+    """A force that sets in at 1 s moves a box that sleeps as it does one that never slept."""
+    cube = decks.cube(2, 1.0, 0.2, (0.0, 0.0, 0.1))
+    floor = text.contact(302, [200], [100], **decks.rubbed(0.5))
+    parts = [cube, floor, text.gravity(), PUSH]
+    sleeping, awake = run(tmp_path, parts, 1.5, True), run(tmp_path, parts, 1.5, False)
+    x = sleeping["bodies/2/position"][:, 0]
+    assert np.abs(x - awake["bodies/2/position"][:, 0]).max() < 1e-6
+    a = 8.0 - 0.5 * 9.81
+    assert x[-1] == pytest.approx(0.5 * a * 0.25, rel=2e-2)
+    assert sleeping.stats["contact_sweeps"] < 0.6 * awake.stats["contact_sweeps"]
+
+
+def test_what_hangs_in_the_air_for_a_moment_does_not_sleep(tmp_path: Path) -> None:
+    """A ball thrown upwards by 1 m/s turns round: nothing holds it."""
+    ball = text.sphere(2, 1.0, 0.1, (0.0, 0.0, 0.1), (0.0, 0.0, 1.0))
+    parts = [ball, text.contact(301, [200], [100], **decks.rubbed(0.0)), text.gravity()]
+    z = run(tmp_path, parts, 0.2, True, 1e-4)["bodies/2/position"][:, 2]
+    assert z[-1] == pytest.approx(0.1 + 0.2 - 0.5 * 9.81 * 0.04, abs=1e-6)
