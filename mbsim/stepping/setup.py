@@ -88,9 +88,9 @@ POINTS_EACH = 64
 #: Velocities of bodies that joints hold, by impulses of all points, are at most so many.
 MOST_WIDE = 200_000
 #: A gap, or what a position changes by, counts from this part of tol L on; what the solver may
-#: leave of a velocity is that part of tol L / h: more where steps are as long as the deck says, for
-#: they are off by more; closing and slipping by a part of tol L in a step are none.
-COUNTS, LEAVES, LEAVES_OF_FIXED, NONE_BELOW = 0.1, 3e-3, 3e-2, 0.09
+#: leave of a velocity is that part of tol L / h; closing and slipping by a part of tol L in a step
+#: are none.
+COUNTS, LEAVES, NONE_BELOW = 0.1, 3e-3, 0.09
 #: Part of what an impact changes of a velocity that the solver may leave, over tol, and at most.
 JUMPS, MOST_JUMPS = 10.0, 0.05
 
@@ -141,7 +141,7 @@ def _plan(system: System, fixed: bool, tol: float) -> Plan:
     number[OWN_TIME] = length / number[PUSH_SPEED]
     number[NEAR] = tol * number[OWN_TIME]
     number[SLOP], number[NOISE] = COUNTS * tol * length, NONE_BELOW * tol * length
-    number[LEFT] = (LEAVES_OF_FIXED if fixed else LEAVES) * tol * length
+    number[LEFT] = LEAVES * tol * length
     sources = [model.transient, *(simulation.transient for simulation in model.simulations)]
     awake = any(source is not None and source.sleep is False for source in sources)
     number[MAY_SLEEP] = float(not awake)
