@@ -26,7 +26,8 @@ from mbsim.stepping.arrays import (
     W_ZZ,
     Stepping,
 )
-from mbsim.stepping.one_point import velocity_of
+from mbsim.stepping.displacements import NO_IMPACT
+from mbsim.stepping.one_point import apply, solve_point, velocity_of
 
 #: Closing and slipping are none up to so many times what the solver may leave of a velocity at
 #: most, however short a step.
@@ -141,6 +142,24 @@ def let_stick(S: Stepping, count: int, noise: float) -> bool:
             P.holds[k] = P.mu[k] = sticking
             changed = True
     return changed
+
+
+@jitable
+def let_jam(S: Stepping, count: int, h: float, allowed: float) -> bool:
+    """Take their rebound from points that impulses cannot give it to; return whether from any.
+
+    A body that friction holds on both sides, as a ball in a wedge that is steeper than its angle,
+    cannot leave: no impulses within the cones bring about normal velocities -e u then. Without
+    rebound there always are some: those that stop everything.
+    """
+    P, some = S.points, False
+    for k in range(count):
+        if P.part[k] == NO_IMPACT or P.ahead[k] >= 0.0 or solve_point(P, S.motion.v, k) <= allowed:
+            continue
+        apply(P, k, S.motion.v, (-P.r[k, 0], -P.r[k, 1], -P.r[k, 2]))
+        P.r[k, 0] = P.r[k, 1] = P.r[k, 2] = 0.0
+        P.ahead[k], P.part[k], some = max(P.gap[k], 0.0) / h, NO_IMPACT, True
+    return some
 
 
 @jitable

@@ -77,6 +77,7 @@ from mbsim.stepping.friction import (
     keep_loads,
     left_near_yield,
     left_of,
+    let_jam,
     let_stick,
     let_yield,
     noise_of,
@@ -378,6 +379,8 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
         tally.count[NEWTONS] += newtons
         if not math.isfinite(left):
             return Code.NOT_FINITE
+        if not solved and let_jam(S, count, h, allowed):
+            continue
         near = left_near_yield(S, count)
         if near < allowed:
             allowed = near

@@ -301,3 +301,38 @@ def test_impacts_of_fixed_steps_leave_the_balance_closed(tmp_path: Path) -> None
     results = mbsim.simulate(model, integrator="MOREAU")
     assert results.audit.balance < 1e-9 * results.audit.of
     assert results.audit.entries["momentum"].excess < 1.0
+
+
+WEDGE = (
+    '<MotionSolve><Model><Body_Rigid id="1" isground="TRUE"/>'
+    '<Reference_Marker id="10" body_id="1" psi="1.5707963267948966" theta="{a}"/>'
+    '<Reference_Marker id="11" body_id="1" psi="-1.5707963267948966" theta="{a}"/>'
+    '<Post_Graphic id="100" type="Plane" rm_id="10"/>'
+    '<Post_Graphic id="101" type="Plane" rm_id="11"/>'
+    '<Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="0.001" inertia_yy="0.001"'
+    ' inertia_zz="0.001" v_ic_z="-5" v_ic_z_flag="TRUE"/>'
+    '<Reference_Marker id="20" body_id="2" pos_z="{z}"/>'
+    '<Post_Graphic id="200" type="Sphere" center_marker_id="20" radius="0.05"/>'
+    '<Force_Contact id="1" num_i_graphics="1" i_graphics_id="200" num_j_graphics="2"'
+    ' j_graphics_id="100 101" cnf_type="POISSON" penalty="1e7" restitution_coef="0.6"'
+    ' normal_trans_vel="0.01" cff_type="COULOMB_ON" mu_static="{mu}" mu_dynamic="{mu}"'
+    ' stiction_trans_vel="0.001" friction_trans_vel="0.001"/>'
+    '<Force_Gravity grav_z="-9.81"/></Model><Command>'
+    '<Simulate analysis_type="Transient" end_time="0.1" print_interval="0.01"/>'
+    "</Command></MotionSolve>"
+)
+
+
+@pytest.mark.parametrize("half", [0.02, 0.1, 0.5])
+@pytest.mark.parametrize("part", [1.1, 3.0])
+def test_a_ball_jams_in_a_wedge_that_is_steeper_than_its_friction(half: float, part: float) -> None:
+    """No impulses within the cones let it rebound: tan half < mu. Compliant contacts jam too."""
+    touches = 0.05 / math.sin(half)
+    text = WEDGE.format(a=0.5 * math.pi - half, z=1.0 * touches + 0.1, mu=part * math.tan(half))
+    results = mbsim.simulate(text, integrator="MOREAU")
+    assert results.audit.warnings == ()
+    assert results["bodies/2/position"][-1] == pytest.approx([0.0, 0.0, touches], abs=1e-4)
+    assert np.abs(results["bodies/2/velocity"][-1]).max() < 1e-6
+    loose = text.replace(f'mu_static="{part * math.tan(half)}"', 'mu_static="0.001"')
+    loose = loose.replace(f'mu_dynamic="{part * math.tan(half)}"', 'mu_dynamic="0.001"')
+    assert mbsim.simulate(loose, integrator="MOREAU")["bodies/2/velocity"][-1, 2] > 2.0
