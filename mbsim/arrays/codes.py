@@ -225,8 +225,9 @@ SLIDER, SLIDES, SLIDER_BEFORE, SLIDES_BEFORE = range(4)
 # columns of `State.sides`: see events.switching
 SIDE, CHATTERING = range(2)
 # entries of `State.chattering`: how often sticking changed of late, whether it asks to change now;
-# how many incidents that go on changed their mode since the last step was passed
-CHANGES, ASKS, CHANGED = range(3)
+# how many incidents that go on changed their mode since the last step was passed; 1 where one that
+# was there at the begin of the step is not at the point asked last
+CHANGES, ASKS, CHANGED, LEFT = range(4)
 #: What chatters more changes at nearly every step, as the sign of what is at rest does: then
 #: steps are not cut there.
 CHATTERS = 4.0

@@ -86,7 +86,7 @@ class State(NamedTuple):
     residual: F3  # (elements, 2, 1 + axes + 2 unknowns) time, x, f and f' at the committed state,
     # and at the begin of the last step
     fastest: F1  # (n,) what the largest speed so far of a group counts: bodies.scales
-    chattering: F1  # (3,) of contacts whose friction is rigid: as of sides, 1 where one asked for
+    chattering: F1  # (4,) of contacts whose friction is rigid: as of sides, 1 where one asked for
     # another mode since the committed state; of all: how many changed it: see events.switching
 
 

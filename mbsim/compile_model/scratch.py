@@ -81,7 +81,7 @@ def start_state(
         # no time: nothing is remembered yet
         residual=np.full((len(residuals.id), 2, len(residuals.given)), np.nan),
         fastest=np.zeros(n.groups),
-        chattering=np.zeros(3),
+        chattering=np.zeros(4),
     )
 
 

@@ -70,7 +70,7 @@ KINDS = {
     "subroutines": Kind("subroutines_sha256", "a user subroutine has changed"),
 }
 #: To be raised where anything else in a checkpoint than its arrays changes its form.
-CHECKPOINT = 2
+CHECKPOINT = 3
 #: Differences that a message lists.
 MOST_LISTED = 3
 #: What stands for a field that facts leave out, and for an element that is not there.

@@ -8,6 +8,7 @@ import os
 import select
 import subprocess
 import sys
+import tempfile
 import threading
 from pathlib import Path
 
@@ -286,10 +287,16 @@ with opened_page() as page:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc, as Linux has it")
-def test_a_browser_ends_with_a_python_that_was_killed(tmp_path):
+def test_a_browser_ends_with_a_python_that_was_killed():
+    # the name of a socket there may have a hundred letters
+    with tempfile.TemporaryDirectory(prefix="b", ignore_cleanup_errors=True) as folder:
+        kill_its_python(folder)
+
+
+def kill_its_python(folder):
     holder = subprocess.Popen(
         [sys.executable, "-c", HOLDS],
-        env=os.environ | {"TMPDIR": str(tmp_path)},
+        env=os.environ | {"TMPDIR": folder},
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -298,7 +305,7 @@ def test_a_browser_ends_with_a_python_that_was_killed(tmp_path):
     browsers = []
     for entry in Path("/proc").iterdir():
         # its profile is the only thing in that folder
-        if entry.name.isdecimal() and f"--user-data-dir={tmp_path}" in words_of(entry):
+        if entry.name.isdecimal() and f"--user-data-dir={folder}" in words_of(entry):
             browsers.append(os.pidfd_open(int(entry.name)))
     assert browsers
     holder.kill()

@@ -1,8 +1,8 @@
 """Where the step under trial leaves the branch that a force was on: see `compile_model.switching`.
 
 What an expression or a force with branches is on is a number, its side. The driver ends a step
-where a side becomes another than it was at the committed state, and where an incident that goes on
-asks for another mode of its friction: one that ends, or begins, has none to leave.
+where a side becomes another than it was at the committed state, where an incident that goes on asks
+for another mode of its friction, and where one has left: one that begins has no mode to leave.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from mbsim.arrays.codes import (
     CHATTERS,
     COMMITTED,
     COUNTS_AS,
+    LEFT,
     SIDE,
     SLIDER_STATIC,
     SLIDES,
@@ -93,6 +94,21 @@ def leaves_branch(scene: Scene) -> bool:
         branch = scene.work.slot[s, BRANCH]
         if state.touching[s] == 1 and branch != UNDECIDED and branch != state.mode[s]:
             return True
+    return False
+
+
+@jitable
+def some_left(scene: Scene) -> bool:
+    """Return whether an incident with modes of the committed state is none at the point evaluated.
+
+    One that was no deeper than rounding of its place has not left.
+    """
+    state, work = scene.state, scene.work
+    for k in range(state.hit[len(state.hit) - 1]):
+        s = state.hit[k]
+        if work.touching[s] == 0 and state.mode[s] % BRANCHES > 0.0:
+            if work.slot[s, DEPTH] > RESOLVED * norm(vector(work.points[s, AT_POINT:])):
+                return True
     return False
 
 
@@ -252,7 +268,10 @@ def watch(scene: Scene, context: int, t: float, y: F1, what: float) -> int:
         keeps, of_modes = f >= 0 and scene.applied.keeps[f] == 1, False
         if k == last and f < 0 and scene.switching.program[k] < 0:
             of_modes = leaves_branch(scene)
-            other = scene.state.chattering[CHANGED] > 0.0
+            chattering = scene.state.chattering
+            if what == ASK:
+                chattering[LEFT] = 1.0 if some_left(scene) else 0.0
+            other = chattering[CHANGED] + chattering[LEFT] > 0.0
         # friction with a memory of its own is on the side that it keeps
         exact = keeps or of_modes
         leaves = now != scene.state.dry[f, SLIDES] if keeps else exact or other
@@ -270,7 +289,7 @@ def watch(scene: Scene, context: int, t: float, y: F1, what: float) -> int:
         if what != ASK:
             sides[k, SIDE] = now
     if what != ASK:
-        scene.state.chattering[CHANGED] = 0.0
+        scene.state.chattering[CHANGED] = scene.state.chattering[LEFT] = 0.0
     if scene.world.hooks[Hook.STICKING] != 0:
         differs = max(differs, watch_sticking(scene, t, y, what))
     # where modes change at nearly every step they are left to each evaluation
