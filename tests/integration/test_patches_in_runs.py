@@ -106,10 +106,13 @@ AGREE = [
     pytest.param(
         depth,
         friction,
-        # the three that take longest, 15 to 22 s each
+        # those that take longest, 10 to 22 s each
         marks=[pytest.mark.slow]
         if (depth, friction)
-        in (("LARGEST", "CFFSUB"), ("LARGEST", "STICTION"), ("VOLUME", "INFINITE"))
+        in (
+            *(("LARGEST", "CFFSUB"), ("LARGEST", "STICTION")),
+            *(("VOLUME", "INFINITE"), ("FIELD", "INFINITE")),
+        )
         else [],
     )
     for depth in DEPTHS

@@ -94,7 +94,10 @@ def test_auto_changes_over_behind_the_step_that_decides_it(monkeypatch):
     assert all(one == times[0] for one in times)
 
 
-@pytest.mark.parametrize(("method", "end"), [("AUTO", 0.02), ("DOP853", 0.004), ("GALPHA", 0.02)])
+@pytest.mark.parametrize(
+    ("method", "end"),
+    [("AUTO", 0.02), pytest.param("DOP853", 0.004, marks=pytest.mark.slow), ("GALPHA", 0.02)],
+)
 def test_contact_problems_on_the_way_change_nothing(method, end, tmp_path):
     model = mbsim.read_model(MODELS / "stiff" / "box_stack.xml")
     settings = {"integrator": method, "end_time": end}

@@ -522,7 +522,9 @@ def test_cam_throws_its_follower_above_a_speed(part, tol, allowed):
     assert cam_balance(results) < allowed / 5
 
 
-@pytest.mark.parametrize(("tol", "allowed"), [(1e-5, 5e-5), (1e-9, 2e-8)])
+@pytest.mark.parametrize(
+    ("tol", "allowed"), [(1e-5, 5e-5), pytest.param(1e-9, 2e-8, marks=pytest.mark.slow)]
+)
 def test_four_bar_stop(tol, allowed):
     results = run_model("four_bar_stop.xml", tol=tol)
     spring = (np.array([-0.1, 0.15]), 400.0, 0.15, 2.0)
