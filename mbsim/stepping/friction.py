@@ -154,7 +154,9 @@ def let_jam(S: Stepping, count: int, h: float, allowed: float) -> bool:
     """
     P, some = S.points, False
     for k in range(count):
-        if P.part[k] == NO_IMPACT or P.ahead[k] >= 0.0 or solve_point(P, S.motion.v, k) <= allowed:
+        if P.mu[k] == 0.0 or P.part[k] == NO_IMPACT or P.ahead[k] >= 0.0:
+            continue
+        if solve_point(P, S.motion.v, k) <= allowed:
             continue
         apply(P, k, S.motion.v, (-P.r[k, 0], -P.r[k, 1], -P.r[k, 2]))
         P.r[k, 0] = P.r[k, 1] = P.r[k, 2] = 0.0
