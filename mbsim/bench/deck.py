@@ -104,13 +104,14 @@ def sphere(
     radius: float,
     position: Sequence[float],
     velocity: Sequence[float] = (0.0, 0.0, 0.0),
+    spin: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> str:
     """Return a solid sphere: a body with graphic `100 number`."""
     inertia = 0.4 * mass * radius**2
     graphic = attributes(
         id=100 * number, type="Sphere", center_marker_id=10 * number, radius=float(radius)
     )
-    whole = body(number, mass, (inertia, inertia, inertia), position, velocity)
+    whole = body(number, mass, (inertia, inertia, inertia), position, velocity, spin)
     return f"{whole}\n<Post_Graphic {graphic}/>"
 
 

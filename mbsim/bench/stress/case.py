@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-Rows = Mapping[str, np.ndarray]
 #: By name what was measured and what is allowed.
 Measures = dict[str, tuple[float, float]]
 #: Returns measures from a run's rows and its tolerance.
@@ -72,8 +71,6 @@ class Deck(NamedTuple):
     ----------
     stored
         Energy that springs and overlaps hold at the start, J.
-    driven
-        Whether something gives energy, so that it may rise.
     """
 
     family: str
@@ -82,7 +79,6 @@ class Deck(NamedTuple):
     methods: Sequence[str]
     check: Check | None = None
     stored: float = 0.0
-    driven: bool = False
     tols: Sequence[float] = TOLS
 
 

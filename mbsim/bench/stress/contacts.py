@@ -42,23 +42,6 @@ def solid_box(
     return f"{text.body(number, mass, inertia, position, velocity, spin)}\n{box(number, lengths)}"
 
 
-def smooth_sphere(
-    number: int,
-    mass: float,
-    radius: float,
-    position: tuple[float, float, float],
-    velocity: tuple[float, float, float],
-    spin: tuple[float, float, float],
-) -> str:
-    """Return a solid sphere that also spins."""
-    inertia = 0.4 * mass * radius**2
-    facts = text.attributes(
-        id=100 * number, type="Sphere", center_marker_id=10 * number, radius=float(radius)
-    )
-    whole = text.body(number, mass, (inertia,) * 3, position, velocity, spin)
-    return f"{whole}\n<Post_Graphic {facts}/>"
-
-
 def rebound(height: float, radius: float) -> Check:
     """Return the check of a ball that fell from `height` and flies again without loss."""
 
@@ -164,7 +147,7 @@ def spins() -> Iterator[Deck]:
         spin = (6e3, -7e3, 4e3)
         statements = [
             *FLOOR,
-            smooth_sphere(2, 1.0, 0.05, (0.0, 0.0, 0.06), (1.0, 0.0, -1.0), spin),
+            text.sphere(2, 1.0, 0.05, (0.0, 0.0, 0.06), (1.0, 0.0, -1.0), spin),
             text.contact(1, [200], [100], **law),
             text.gravity(),
         ]

@@ -139,13 +139,12 @@ def _judged(case: Case, results: Results, told: list[str], seconds: float) -> Ve
     if not all(np.isfinite(rows).all() for rows in motion):
         return verdict(case, NAN, "rows", steps=motion.steps, seconds=seconds)
     measures = case.deck.check(motion, case.tol) if case.deck.check else {}
-    if not case.deck.driven:
-        moved = motion.size + case.deck.stored
-        allowed = min(OF_ENERGY, OF_TOL * case.tol * np.sqrt(motion.steps) + ROUNDING) * moved
-        # a place is right to tol times a length: the weight of what rests makes energy of it
-        allowed += 10.0 * case.tol * motion.load * np.abs(motion.x).max()
-        gained = float((motion.energy - motion.energy[0]).max()) - case.deck.stored
-        measures["energy gained"] = (gained, allowed)
+    moved = motion.size + case.deck.stored
+    allowed = min(OF_ENERGY, OF_TOL * case.tol * np.sqrt(motion.steps) + ROUNDING) * moved
+    # a place is right to tol times a length: the weight of what rests makes energy of it
+    allowed += 10.0 * case.tol * motion.load * np.abs(motion.x).max()
+    gained = float((motion.energy - motion.energy[0]).max()) - case.deck.stored
+    measures["energy gained"] = (gained, allowed)
     worst, reason = 0.0, ""
     for name, (value, allowed) in measures.items():
         part = value / allowed if allowed > 0.0 else (0.0 if value <= 0.0 else np.inf)
