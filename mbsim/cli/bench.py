@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from click.core import ParameterSource
 
 from mbsim.cli.messages import echo
 from mbsim.cli.options import json_option
@@ -82,6 +83,13 @@ def command(
     DIR/stress.csv and stress.md.
     """
     if stress:
+        given = click.get_current_context().get_parameter_source
+        for name in ("repeats", "no_peers"):
+            if given(name) is not ParameterSource.DEFAULT:
+                option = "--" + name.replace("_", "-")
+                raise click.UsageError(
+                    f"--stress runs each case once and no peer: leave out {option}"
+                )
         _stress(scenes, output, tolerances, integrators, as_json)
         return
     from mbsim.bench import peers, plot, report, runner

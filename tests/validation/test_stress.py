@@ -118,3 +118,11 @@ def test_the_command_writes_a_table_and_its_exit_code_tells_of_faults(tmp_path, 
         assert "place 2 of 1 allowed" in (tmp_path / "stress.md").read_text()
         rows = (tmp_path / "stress.csv").read_text().splitlines()
         assert len(rows) == 1 + len(chosen(Asked(("spin",), ("DOP853",), (1e-5,))))
+
+
+@pytest.mark.parametrize("option", [["--no-peers"], ["--repeats", "3"]])
+def test_options_that_stress_does_not_have_are_refused(option, tmp_path):
+    done = CliRunner().invoke(main, ["bench", "--stress", "spin", *option, "-o", str(tmp_path)])
+    assert done.exit_code == 2
+    assert f"leave out {option[0]}" in done.output
+    assert list(tmp_path.iterdir()) == []
