@@ -82,6 +82,7 @@ from mbsim.integrators.scheme import (
     RETRY,
     ROW,
     ROW_ENDS,
+    RUN_END,
     STALE,
     STEP,
     STEPS,
@@ -378,6 +379,7 @@ def advance(  # noqa: C901
         m.memory[CHANGE_DUE] = 0.0
         return CHANGES_OVER
     stop_at = m.counts[EVALUATIONS] + budget
+    run_end = max(t_end, m.memory[RUN_END])
     while m.memory[TIME] < t_end:
         if m.counts[EVALUATIONS] >= stop_at:
             return PAUSED
@@ -401,7 +403,7 @@ def advance(  # noqa: C901
             if code != 0:
                 m.counts[CODE] = code
                 return FAILED
-            if begins_stiff(m, steps, t_end):
+            if begins_stiff(m, steps, run_end):
                 return CHANGES_OVER
         floor = smallest_step(t, m.memory[OWN_TIME], h_min)
         if steps.order == 0.0 and t >= m.memory[FAILED_AT] and bound_is_due(m):
@@ -485,7 +487,7 @@ def advance(  # noqa: C901
             if code != 0:
                 m.counts[CODE] = code
                 return FAILED
-        if m.memory[WATCH] == 1.0 and changes_over(m, steps, most, t_end):
+        if m.memory[WATCH] == 1.0 and changes_over(m, steps, most, run_end):
             m.memory[CHANGE_DUE] = 1.0
         if full > 0 or word & Taken.ROWS_FULL:
             return ROWS_FULL

@@ -105,7 +105,9 @@ WINDOW_STEPS, WINDOW_STIFF, WINDOW_TIME, WINDOW_WORK, WINDOWS = range(64, 69)
 HITS = 69
 # 1 where a force leaves the branch at once that a change has just put it on
 AT_ONCE = 70
-MEMORY = 71
+# when the run ends, as far as its caller knows: steps are asked for up to nearer times
+RUN_END = 71
+MEMORY = 72
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
@@ -197,6 +199,7 @@ def make(scheme: Scheme, y0: Any, t0: float, kinds: Any = None, rows: int = 1) -
     memory[H_SMALLEST] = memory[GROWTH] = math.inf
     memory[FAILED_AT] = t0
     memory[LEFT_PART] = LEFT
+    memory[RUN_END] = -math.inf
     memory[HELD] = math.inf
     memory[ROW_ENDS] = memory[HORIZON] = memory[COSTLY] = math.inf
     counts = np.zeros(COUNTS, dtype=np.int64)

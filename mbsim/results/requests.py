@@ -30,7 +30,7 @@ _MEASURES = {
 #: Those whose third argument says whether it is a force (1..4) or a torque (5..8).
 _FORCES_OF_ELEMENTS = {name for name, function in FUNCTIONS.items() if "jflag" in function.args}
 #: F1 and F5 are magnitudes of the three columns behind them.
-_MAGNITUDES = (1, 5)
+MAGNITUDES = (1, 5)
 
 # below this sine of theta, psi and phi turn about one line and only their sum is known
 _SINGULAR = 1e-9
@@ -123,7 +123,7 @@ def columns_of(request: Request) -> tuple[str, ...]:
         return TYPES[request.type].columns
     exprs = (*request.exprs, *[None] * 8)[:8]
     return tuple(
-        expr.text if expr is not None else "mag" if k in _MAGNITUDES else ""
+        expr.text if expr is not None else "mag" if k in MAGNITUDES else ""
         for k, expr in enumerate(exprs, 1)
     )
 
@@ -135,7 +135,7 @@ def measures_of(request: Request) -> tuple[str, ...]:
     """
     exprs = (*request.exprs, *[None] * 8)[:8]
     found = ["" if expr is None else _measure(expr) for expr in exprs]
-    for number in _MAGNITUDES:
+    for number in MAGNITUDES:
         parts = {found[k] for k in range(number, number + 3) if exprs[k] is not None}
         if exprs[number - 1] is None and len(parts) == 1:
             found[number - 1] = parts.pop()
@@ -206,13 +206,18 @@ def expressions(request: Request, values: Sequence[tuple[int, int]], value: Arra
     value : ndarray, shape (n, values)
     """
     made = np.zeros((len(value), 8))
-    given = {number: column for column, (id, number) in enumerate(values) if id == request.id}
+    given = places(request, values)
     for number, column in given.items():
         made[:, number - 1] = value[:, column]
-    for number in _MAGNITUDES:
+    for number in MAGNITUDES:
         if number not in given:
             made[:, number - 1] = np.linalg.norm(made[:, number : number + 3], axis=1)
     return made
+
+
+def places(request: Request, values: Sequence[tuple[int, int]]) -> dict[int, int]:
+    """Return the column of `value` for each F number of an EXPRESSION that the deck gives."""
+    return {number: column for column, (id, number) in enumerate(values) if id == request.id}
 
 
 #: F2..F4 and F6..F8 (n, 3) of I relative to J, global axes; None for the angles of a rotation.

@@ -52,11 +52,20 @@ class HookCalls:
         self._look_at(answer if acts else min(answer, 0), t)
         return answer
 
-    def call_output(self, t: float, h: float, a: Any, b: Any) -> None:
-        """Let a row be written; raise what fails. Asked between steps, so it is kept short."""
-        answer = self._output(self.problem.context, t, h, a.ctypes.data, b.ctypes.data)
-        if answer < 0:
-            self._look_at(answer, t)
+    def writer(self, y: Any, error: Any) -> Callable[[float, float], None]:
+        """Return what lets a row be written of y as it is then; it raises what fails.
+
+        It is called between steps, as often as a controller reads a signal, so it is kept short.
+        """
+        output, context = self._output, self.problem.context
+        at, other = y.ctypes.data, error.ctypes.data
+
+        def write(t: float, h: float) -> None:
+            answer = output(context, t, h, at, other)
+            if answer < 0:
+                self._look_at(answer, t)
+
+        return write
 
     def _look_at(self, code: int, t: float) -> None:
         """Raise what a hook's code says, or its answer that is less a code."""

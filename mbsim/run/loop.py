@@ -338,6 +338,7 @@ class Runner:
             Whether there is anything to integrate.
         """
         from mbsim.arrays.codes import ANEW, AUDIT_TOL, AUDIT_UNTIL, TOLERANCE
+        from mbsim.integrators.scheme import RUN_END
 
         scene, simulation = self.system.scene, stage.simulation
         # the last change so far holds; a resumed run may have missed an earlier one
@@ -346,6 +347,7 @@ class Runner:
                 pull = self.system.pull(passed.simulation.gravity)
                 scene.world.gravity[:], scene.world.weight[0] = pull.constant, pull.program
         scene.world.scale[TOLERANCE] = stage.tol
+        self.method.memory[RUN_END] = simulation.end_time
         self.commands.apply(self.stage, fresh, self.methods, self.log.line)
         plan = scene.audit.plan
         plan[AUDIT_TOL], plan[AUDIT_UNTIL] = stage.tol, simulation.end_time

@@ -81,6 +81,7 @@ class Stepper(Runner):
         self._fresh = True  # whether no row holds the present time
         self._budget, self._closed, self._failed = FIRST_BUDGET, False, False
         self._at = np.zeros(len(self.method.y))
+        self._write = self.hooks.writer(self._at, self.method.error)
         self.inputs = Inputs(system.model, system.scene, names, self._input_changed)
         self.moving_inputs = self._moving_inputs()
         self.signals = SignalsNow(system, lambda: self.time, self.method.y, self._row_now)
@@ -317,14 +318,13 @@ class Stepper(Runner):
         row = int(rows.used[USED_ROWS])
         if self._fresh:
             self._open()
-            used = rows.used.copy()
-            np.copyto(self._at, self.method.y)
-            t = self.time
+            used = rows.used.tolist()
+            self._at[:] = self.method.y
             within = 0.0
             if self.methods.steps.order == 0.0:
                 # forces that depend on a fixed step are shown as they acted
-                within = float(self._memory[scheme.LAST_STEP])
-            self.hooks.call_output(t, within, self._at, self.method.error)
+                within = self._memory.item(scheme.LAST_STEP)
+            self._write(self._memory.item(scheme.TIME), within)
             rows.used[:] = used
             self._fresh = False
         return row

@@ -83,6 +83,19 @@ def test_the_pattern_of_steps_changes_nothing_but_errors(method):
     np.testing.assert_allclose(found, exact, atol=2e-7)
 
 
+def test_how_far_is_stepped_at_once_does_not_choose_the_method():
+    # a contact that is stiff: the run's rest is worth the implicit method, a step's is not
+    evaluations = []
+    for pieces in (1, 100):
+        with mbsim.open(MODELS / "pendulum_wheel.xml", end_time=1.0) as sim:
+            sim.inputs["torque"] = 1e-12
+            for k in range(pieces):
+                sim.step_to((k + 1) / pieces)
+            evaluations.append(sim.results().stats["rhs_evaluations"])
+    # 1900 and 2900; 9000 where the explicit method is kept
+    assert evaluations[1] < 2 * evaluations[0]
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_what_is_set_between_steps_acts_from_there_on(method):
     """Exact between the times at which the force changes: no slope of the one before is used."""
