@@ -47,7 +47,7 @@ class Camera:
         self.page = page
         file = folder / "view.html"
         file.write_bytes(text.encode("utf-8"))
-        page.open(file.as_uri())
+        page.open(file.as_uri() + "#picture")  # smooth edges, whoever draws
         first, last = page.run("mbsimReady.then(view => view.span)")
         self.span: tuple[float, float] = (float(first), float(last))
         #: Units of time a second.

@@ -113,39 +113,59 @@ mbsim.shapes = (function () {
   // Triangles with a normal at each corner: that of faces around it which bend by less than CREASE.
   function meshGeometry(vertices, faces) {
     const count = faces.length / 3;
-    const normals = new Float32Array(3 * count);
-    for (let f = 0; f < count; f += 1) {
-      const a = 3 * faces[3 * f], b = 3 * faces[3 * f + 1], c = 3 * faces[3 * f + 2];
+    // of each face, twice its area as long; and of length 1
+    const normals = new Float32Array(3 * count), units = new Float32Array(3 * count);
+    for (let f = 0; f < 3 * count; f += 3) {
+      const a = 3 * faces[f], b = 3 * faces[f + 1], c = 3 * faces[f + 2];
       const ux = vertices[b] - vertices[a], uy = vertices[b + 1] - vertices[a + 1], uz = vertices[b + 2] - vertices[a + 2];
       const vx = vertices[c] - vertices[a], vy = vertices[c + 1] - vertices[a + 1], vz = vertices[c + 2] - vertices[a + 2];
-      normals[3 * f] = uy * vz - uz * vy;
-      normals[3 * f + 1] = uz * vx - ux * vz;
-      normals[3 * f + 2] = ux * vy - uy * vx;
+      const x = uy * vz - uz * vy, y = uz * vx - ux * vz, z = ux * vy - uy * vx;
+      const size = Math.sqrt(x * x + y * y + z * z) || 1;
+      normals[f] = x; normals[f + 1] = y; normals[f + 2] = z;
+      units[f] = x / size; units[f + 1] = y / size; units[f + 2] = z / size;
     }
     const first = new Uint32Array(vertices.length / 3 + 1);
     for (const vertex of faces) { first[vertex + 1] += 1; }
     for (let k = 1; k < first.length; k += 1) { first[k] += first[k - 1]; }
-    const of = new Uint32Array(faces.length), filled = first.slice();
-    faces.forEach((vertex, k) => { of[filled[vertex]] = Math.floor(k / 3); filled[vertex] += 1; });
-    const position = new Float32Array(9 * count), normal = new Float32Array(9 * count);
-    for (let k = 0; k < faces.length; k += 1) {
-      const vertex = faces[k], f = Math.floor(k / 3);
-      const nx = normals[3 * f], ny = normals[3 * f + 1], nz = normals[3 * f + 2];
-      const own = Math.hypot(nx, ny, nz) || 1;
-      let x = 0, y = 0, z = 0;
+    const corners = new Uint32Array(faces.length), filled = first.slice();
+    for (let k = 0; k < faces.length; k += 1) { corners[filled[faces[k]]++] = k; }
+    // corners of a vertex with the same normal are one: a third of them, or less, is left to be drawn
+    const position = new Float32Array(9 * count), normal = new Float32Array(9 * count), index = new Uint32Array(faces.length);
+    let made = 0;
+    for (let vertex = 0; vertex + 1 < first.length; vertex += 1) {
+      // faces of a fan, as of a gear's end, are of one plane: what was found last is theirs too
+      const begin = made;
+      let last = -1, at = 0;
       for (let m = first[vertex]; m < first[vertex + 1]; m += 1) {
-        const g = 3 * of[m];
-        const length = Math.hypot(normals[g], normals[g + 1], normals[g + 2]) || 1;
-        if (nx * normals[g] + ny * normals[g + 1] + nz * normals[g + 2] < CREASE * own * length) { continue; }
-        x += normals[g]; y += normals[g + 1]; z += normals[g + 2];
+        const k = corners[m], f = k - k % 3;
+        const nx = units[f], ny = units[f + 1], nz = units[f + 2];
+        if (last < 0 || nx !== units[last] || ny !== units[last + 1] || nz !== units[last + 2]) {
+          let x = 0, y = 0, z = 0;
+          for (let n = first[vertex]; n < first[vertex + 1]; n += 1) {
+            const g = corners[n] - corners[n] % 3;
+            if (nx * units[g] + ny * units[g + 1] + nz * units[g + 2] < CREASE) { continue; }
+            x += normals[g]; y += normals[g + 1]; z += normals[g + 2];
+          }
+          const size = Math.sqrt(x * x + y * y + z * z) || 1;
+          x /= size; y /= size; z /= size;
+          last = f;
+          for (at = begin; at < made; at += 1) {
+            const alike = x * normal[3 * at] + y * normal[3 * at + 1] + z * normal[3 * at + 2];
+            if (alike > 1 - 1e-6) { break; }
+          }
+          if (at === made) {
+            for (let c = 0; c < 3; c += 1) { position[3 * at + c] = vertices[3 * vertex + c]; }
+            normal[3 * at] = x; normal[3 * at + 1] = y; normal[3 * at + 2] = z;
+            made += 1;
+          }
+        }
+        index[k] = at;
       }
-      const size = Math.hypot(x, y, z) || 1;
-      position.set([vertices[3 * vertex], vertices[3 * vertex + 1], vertices[3 * vertex + 2]], 3 * k);
-      normal.set([x / size, y / size, z / size], 3 * k);
     }
     const geometry = new THREE.BufferGeometry();
-    geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
-    geometry.setAttribute("normal", new THREE.BufferAttribute(normal, 3));
+    geometry.setAttribute("position", new THREE.BufferAttribute(position.slice(0, 3 * made), 3));
+    geometry.setAttribute("normal", new THREE.BufferAttribute(normal.slice(0, 3 * made), 3));
+    geometry.setIndex(new THREE.BufferAttribute(index, 1));
     return geometry;
   }
 

@@ -86,9 +86,20 @@ mbsim.Stage = (function () {
     return [0, 1, 2].map((k) => Math.cos(angle) * x[k] + Math.sin(angle) * y[k]);
   }
 
+  // Whether a processor draws: smooth edges of many triangles take it three times as long.
+  function drawnByProcessor() {
+    const gl = document.createElement("canvas").getContext("webgl2");
+    if (!gl) { return false; }
+    const info = gl.getExtension("WEBGL_debug_renderer_info");
+    const name = gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER);
+    const lose = gl.getExtension("WEBGL_lose_context");
+    if (lose) { lose.loseContext(); }
+    return /swiftshader|llvmpipe|softpipe|software/i.test(name);
+  }
+
   class Stage {
     constructor(canvas, run) {
-      this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
+      this.renderer = new THREE.WebGLRenderer({ canvas, antialias: location.hash === "#picture" || !drawnByProcessor() });
       this.renderer.shadowMap.enabled = true;
       this.renderer.shadowMap.type = THREE.PCFShadowMap;
       this.renderer.toneMapping = THREE.NeutralToneMapping;
