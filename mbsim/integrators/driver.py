@@ -97,7 +97,7 @@ from mbsim.integrators.scheme import (
     note_failure,
     project,
 )
-from mbsim.integrators.stability import keep_to_bound, stay_within
+from mbsim.integrators.stability import keep_to_bound, note_bound, stay_within
 
 #: Where steps are cut one after another, whole ones grow so much at most.
 CUT_GROW = 2.0
@@ -458,6 +458,8 @@ def advance(  # noqa: C901
             m.memory[STEP] = max(m.memory[STEP], behind)
         m.memory[STEP] = max(m.memory[STEP], m.memory[CUT_FROM])
         m.memory[CUT_FROM] = 0.0
+        if not steps.implicit:
+            note_bound(m, uncut)
         if is_bounded(m) and not steps.implicit:
             stay_within(m, most, uncut)
         elif m.memory[KEEPS_TO_BOUND] == 1.0:

@@ -105,7 +105,10 @@ WINDOW_STEPS, WINDOW_STIFF, WINDOW_TIME, WINDOW_WORK, WINDOWS = range(64, 69)
 HITS = 69
 # 1 where a force leaves the branch at once that a change has just put it on
 AT_ONCE = 70
-MEMORY = 71
+# of an explicit method: for how many steps still one that was at the bound is remembered; after how
+# many windows within the bound the next one goes beyond
+AT_BOUND, WAIT = range(71, 73)
+MEMORY = 73
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)

@@ -335,16 +335,17 @@ def test_too_many_bodies_are_said(monkeypatch):
 
 
 @pytest.mark.parametrize("method", ["DOPRI5", "DOP853"])
-@pytest.mark.parametrize(
-    ("deck", "most"), [("sdnd100", 2.0), ("belt_stick_slip", 1.5), ("belt_weakening", 1.6)]
-)
-def test_explicit_methods_take_about_as_much_at_a_looser_tolerance(method, deck, most):
-    """Beyond the bound of stability friction shook: sdnd100 took ten times as many at 1e-4."""
+@pytest.mark.parametrize("deck", ["sdnd100", "belt_stick_slip", "belt_weakening", "bowling_ball"])
+def test_explicit_methods_take_no_more_at_a_looser_tolerance(method, deck):
+    """What rested trembled at its bound of stability, and was thrown, within a loose tolerance.
+
+    sdnd100 took ten times as many at 1e-4, and at 1e-2 as at 1e-3 the belts 1.4, the ball 1.6.
+    """
     model = mbsim.read_model(MODELS / f"{deck}.xml")
     work = [
         mbsim.simulate(model, integrator=method, tol=tol).stats["rhs_evaluations"]
         for tol in (1e-5, 1e-4, 1e-3, 1e-2)
     ]
     for tighter, looser in itertools.pairwise(work):
-        assert looser < most * tighter
+        assert looser < 1.15 * tighter
     assert max(work) < 2.0 * min(work)
