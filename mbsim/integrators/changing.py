@@ -50,6 +50,7 @@ from mbsim.integrators.scheme import (
     LAST_ERROR,
     LAST_STEP,
     PACE,
+    PART,
     PATIENCE,
     RELUCTANCE,
     STEP,
@@ -82,6 +83,9 @@ EVALUATIONS_A_STEP = 6.0
 #: A change is worth it for so many steps that are still to be taken; once the implicit method has
 #: run, and nothing is to be loaded for it, for fewer.
 WORTH, WORTH_AGAIN = 2000, 200
+#: It is worth it as well where so many are saved, if steps at the bound go on as they do: as the
+#: error of RECENT ones tells, which allows so much longer ones.
+WORTH_SMOOTH, RECENT = 100, 10.0
 #: At the begin, where the largest rate is measured: what is lost if it was wrong is small then.
 WORTH_AT_ONCE = 4000
 #: With so many ahead the implicit method is tried after as many steps as there is patience for.
@@ -95,6 +99,8 @@ IMPLICIT_WORK = 2.5
 #: What the implicit method takes, in evaluations, until it runs well again; what is lost with the
 #: explicit steps until then if it was wrong to leave it. A short trial tells so much of others.
 IMPLICIT_START = 250.0
+#: And for a step of its own.
+IMPLICIT_STEP = 25.0
 WRONG, SHORT_TELLS = EVALUATIONS_A_STEP * FIRST_PATIENCE + IMPLICIT_START, 0.2
 
 
@@ -131,6 +137,10 @@ def count_stiff(m: Method, h: float) -> None:
     if m.memory[STIFFNESS] > BOUND:
         # a hidden rate is far beyond the bound: what else it bounds trembles soon
         m.memory[STIFF_STEPS] += 2.0 if m.memory[STIFFNESS] == math.inf else 1.0
+        if m.memory[WAS_CUT] == 0.0:
+            part = min(1.0, m.memory[LAST_ERROR] ** 0.2)
+            over = min(m.memory[STIFF_STEPS], RECENT)
+            m.memory[PART] += (part - m.memory[PART]) / over
         m.memory[CALM_STEPS] = 0.0
         m.memory[STIFF_STEP] = h
     elif m.memory[STIFF_STEPS] > 0.0:
@@ -140,6 +150,13 @@ def count_stiff(m: Method, h: float) -> None:
             m.memory[STIFF_STEPS] = 0.0
     if m.memory[LAST_STEP] < THROWS * m.memory[STIFF_STEP]:
         m.memory[BOUNDED] = 1.0
+
+
+@jitable
+def is_smooth(m: Method, ahead: float) -> bool:
+    """Return whether the error tells that the implicit method takes far less for so many steps."""
+    saved = EVALUATIONS_A_STEP - IMPLICIT_STEP * m.memory[PART]
+    return ahead * saved - IMPLICIT_START > EVALUATIONS_A_STEP * WORTH_SMOOTH
 
 
 @jitable
@@ -170,8 +187,9 @@ def is_stiff(m: Method, steps: Steps, h: float, t_end: float) -> bool:
     # steps that grow, as from a start, are not yet those to come
     most = (t_end - t) / m.memory[STEP] if m.memory[WAS_CUT] == 0.0 else math.inf
     ahead = min((t_end - t) * m.memory[PACE], most)
+    smooth = m.memory[STIFF_STEPS] > 1.0 and is_smooth(m, most)
     if m.memory[COSTLY] == math.inf:
-        enough = ahead > WORTH
+        enough = ahead > WORTH or smooth
     elif m.memory[PACE] == 0.0:
         # until there is a window, as many a time as when it was found stiff before
         enough = min((t_end - t) * m.memory[COSTLY], most) > WORTH_AGAIN
