@@ -187,7 +187,7 @@ def is_stiff(m: Method, steps: Steps, h: float, t_end: float) -> bool:
     # steps that grow, as from a start, are not yet those to come
     most = (t_end - t) / m.memory[STEP] if m.memory[WAS_CUT] == 0.0 else math.inf
     ahead = min((t_end - t) * m.memory[PACE], most)
-    smooth = m.memory[STIFF_STEPS] > 1.0 and is_smooth(m, most)
+    smooth = m.memory[STIFF_STEPS] > 1.0 and most < math.inf and is_smooth(m, most)
     if m.memory[COSTLY] == math.inf:
         enough = ahead > WORTH or smooth
     elif m.memory[PACE] == 0.0:
