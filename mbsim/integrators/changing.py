@@ -233,9 +233,10 @@ def is_calm(p: Problem, m: Method, context: int, probe: int, t_end: float) -> bo
         if rate > 0.0:
             part = min(part, WITHIN / (rate * h))
     if part > 0.0:
-        # of steps of this length, and no more time than they took: short ones are behind an event
-        each = IMPLICIT_WORK * work / taken
-        gain = (each - EVALUATIONS_A_STEP / part) * min((t - m.memory[BEGUN]) / h, taken)
+        # over the time that they took, in steps of this length: shorter ones are behind an event;
+        # where longer ones were among them explicit steps would have taken many
+        each, passed = IMPLICIT_WORK * work / taken, (t - m.memory[BEGUN]) / h
+        gain = each * min(passed, taken) - EVALUATIONS_A_STEP / part * passed
     # what it takes a time, against what the explicit method took: of that the trial is another word
     costly = IMPLICIT_WORK * work > EVALUATIONS_A_STEP * m.memory[COSTLY] * (t - m.memory[BEGUN])
     agreed = 1.0 if costly else 0.5
