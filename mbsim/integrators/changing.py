@@ -22,7 +22,9 @@ else they shake leaves the state that the implicit method would begin from. What
 and touches, and steps are short behind that: as calm they count by their length. Else a run that
 takes as many steps a time as when it was found stiff before, or has very many steps ahead, tries
 the implicit method now and then.
-Models whose explicit run is short stay explicit, stiff or not, and compile nothing else.
+Models whose explicit run is short stay explicit, stiff or not, and compile nothing else: of fewer
+than WORTH steps, or fewer still where the error of steps at the bound would let them be many times
+as long, as of what has come to rest. There RADAU5 takes a tenth of the work.
 Source: E. Hairer, G. Wanner, Solving ODEs II (1996), section IV.2.
 """
 
@@ -47,9 +49,11 @@ from mbsim.integrators.scheme import (
     FIRST_MAX,
     IMPLICIT_STEPS,
     JACOBIANS,
+    KEEPS_TO_BOUND,
     LAST_ERROR,
     LAST_STEP,
     PACE,
+    PART,
     PATIENCE,
     RELUCTANCE,
     STEP,
@@ -65,7 +69,7 @@ from mbsim.integrators.scheme import (
     failure_or,
     in_workspace,
 )
-from mbsim.integrators.stability import BOUND, WITHIN
+from mbsim.integrators.stability import BOUND, WITHIN, keep_to_bound, note_bound, stay_within
 
 #: Of `serve`: context, `attempt` of the explicit method, end of the run.
 ASKED = types.int64(types.int64, types.int64, types.float64)
@@ -81,7 +85,10 @@ WINDOW = 200
 EVALUATIONS_A_STEP = 6.0
 #: A change is worth it for so many steps that are still to be taken; once the implicit method has
 #: run, and nothing is to be loaded for it, for fewer.
-WORTH, WORTH_AGAIN = 2000, 200
+WORTH, WORTH_AGAIN = 800, 200
+#: It is worth it for the first time as well where so many are saved, if steps at the bound go on as
+#: they do. How much longer implicit ones are the error of RECENT ones tells.
+WORTH_SMOOTH, RECENT = 100, 10.0
 #: At the begin, where the largest rate is measured: what is lost if it was wrong is small then.
 WORTH_AT_ONCE = 4000
 #: With so many ahead the implicit method is tried after as many steps as there is patience for.
@@ -95,6 +102,8 @@ IMPLICIT_WORK = 2.5
 #: What the implicit method takes, in evaluations, until it runs well again; what is lost with the
 #: explicit steps until then if it was wrong to leave it. A short trial tells so much of others.
 IMPLICIT_START = 250.0
+#: And for a step of its own.
+IMPLICIT_STEP = 25.0
 WRONG, SHORT_TELLS = EVALUATIONS_A_STEP * FIRST_PATIENCE + IMPLICIT_START, 0.2
 
 
@@ -110,6 +119,16 @@ def is_bounded(m: Method) -> bool:
     method may begin soon: from what flies about it takes long.
     """
     return m.memory[BOUNDED] == 1.0 or m.memory[STIFF_STEPS] >= STEADY
+
+
+@jitable
+def bound_next(m: Method, h: float, error: float) -> None:
+    """Let the explicit step after one of length h and this error keep to the bound, where it has to."""
+    note_bound(m, error)
+    if is_bounded(m):
+        stay_within(m, h, error)
+    elif m.memory[KEEPS_TO_BOUND] == 1.0:
+        keep_to_bound(m, h, error)
 
 
 @jitable
@@ -131,6 +150,10 @@ def count_stiff(m: Method, h: float) -> None:
     if m.memory[STIFFNESS] > BOUND:
         # a hidden rate is far beyond the bound: what else it bounds trembles soon
         m.memory[STIFF_STEPS] += 2.0 if m.memory[STIFFNESS] == math.inf else 1.0
+        if m.memory[WAS_CUT] == 0.0:
+            part = min(1.0, m.memory[LAST_ERROR] ** 0.2)
+            over = min(m.memory[STIFF_STEPS], RECENT)
+            m.memory[PART] += (part - m.memory[PART]) / over
         m.memory[CALM_STEPS] = 0.0
         m.memory[STIFF_STEP] = h
     elif m.memory[STIFF_STEPS] > 0.0:
@@ -140,6 +163,13 @@ def count_stiff(m: Method, h: float) -> None:
             m.memory[STIFF_STEPS] = 0.0
     if m.memory[LAST_STEP] < THROWS * m.memory[STIFF_STEP]:
         m.memory[BOUNDED] = 1.0
+
+
+@jitable
+def is_smooth(m: Method, ahead: float) -> bool:
+    """Return whether the error tells that the implicit method takes far less for so many steps."""
+    saved = EVALUATIONS_A_STEP - IMPLICIT_STEP * m.memory[PART]
+    return ahead * saved - IMPLICIT_START > EVALUATIONS_A_STEP * WORTH_SMOOTH
 
 
 @jitable
@@ -170,8 +200,9 @@ def is_stiff(m: Method, steps: Steps, h: float, t_end: float) -> bool:
     # steps that grow, as from a start, are not yet those to come
     most = (t_end - t) / m.memory[STEP] if m.memory[WAS_CUT] == 0.0 else math.inf
     ahead = min((t_end - t) * m.memory[PACE], most)
+    smooth = m.memory[STIFF_STEPS] > 1.0 and most < math.inf and is_smooth(m, most)
     if m.memory[COSTLY] == math.inf:
-        enough = ahead > WORTH
+        enough = ahead > WORTH or smooth
     elif m.memory[PACE] == 0.0:
         # until there is a window, as many a time as when it was found stiff before
         enough = min((t_end - t) * m.memory[COSTLY], most) > WORTH_AGAIN
@@ -215,9 +246,10 @@ def is_calm(p: Problem, m: Method, context: int, probe: int, t_end: float) -> bo
         if rate > 0.0:
             part = min(part, WITHIN / (rate * h))
     if part > 0.0:
-        # of steps of this length, and no more time than they took: short ones are behind an event
-        each = IMPLICIT_WORK * work / taken
-        gain = (each - EVALUATIONS_A_STEP / part) * min((t - m.memory[BEGUN]) / h, taken)
+        # over the time that they took, in steps of this length: shorter ones are behind an event;
+        # where longer ones were among them explicit steps would have taken many
+        each, passed = IMPLICIT_WORK * work / taken, (t - m.memory[BEGUN]) / h
+        gain = each * min(passed, taken) - EVALUATIONS_A_STEP / part * passed
     # what it takes a time, against what the explicit method took: of that the trial is another word
     costly = IMPLICIT_WORK * work > EVALUATIONS_A_STEP * m.memory[COSTLY] * (t - m.memory[BEGUN])
     agreed = 1.0 if costly else 0.5

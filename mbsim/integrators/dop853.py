@@ -36,7 +36,7 @@ from mbsim.integrators.scheme import (
     interpolate,
     project,
 )
-from mbsim.integrators.stability import clear_differences, note_difference, rate_between
+from mbsim.integrators.stability import allowed, clear_differences, note_difference, rate_between
 
 
 def _table(width: int, *rows: Any) -> F2:
@@ -232,7 +232,7 @@ def attempt(p: Problem, m: Method, t: float, h: float) -> int:
     if keep_bent(m, t, h):
         least = COUNTS * call_float(p.norm, (p.context, t, h, m.error, m.trial))
     fifth = estimate(p, m, t, h, E5[0])
-    m.memory[LAST_ERROR] = max(combined_error(fifth, third), least) / m.memory[TOL]
+    m.memory[LAST_ERROR] = max(combined_error(fifth, third), least) / allowed(m)
     if not m.memory[LAST_ERROR] <= 1.0:
         return 0
     m.counts[EVALUATIONS] += 1

@@ -18,7 +18,6 @@ from mbsim.integrators.scheme import (
     KEEPS_TO_BOUND,
     LAST_ERROR,
     STIFFNESS,
-    TOL,
     WATCH,
     Method,
     Scheme,
@@ -27,6 +26,7 @@ from mbsim.integrators.scheme import (
 )
 from mbsim.integrators.stability import (
     DIFFERENCES,
+    allowed,
     clear_differences,
     note_difference,
     rate_between,
@@ -98,7 +98,7 @@ def attempt(p: Problem, m: Method, t: float, h: float) -> int:
         m.error[i] = h * (
             E1 * k[0, i] + E3 * k[2, i] + E4 * k[3, i] + E5 * k[4, i] + E6 * k[5, i] + E7 * k[6, i]
         )
-    m.memory[LAST_ERROR] = call_float(p.norm, (p.context, t, h, m.error, w)) / m.memory[TOL]
+    m.memory[LAST_ERROR] = call_float(p.norm, (p.context, t, h, m.error, w)) / allowed(m)
     if m.memory[WATCH] == 1.0 or m.memory[KEEPS_TO_BOUND] == 1.0:
         m.memory[STIFFNESS] = stiffness(p, m, t, h)
     return 0

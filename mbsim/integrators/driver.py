@@ -36,7 +36,7 @@ from mbsim.core.problem import (
 )
 from mbsim.integrators.attempt import LOCATED, attempt_to_event
 from mbsim.integrators.branches import BEGIN, TAKEN
-from mbsim.integrators.changing import begins_stiff, changes_over, is_bounded
+from mbsim.integrators.changing import begins_stiff, bound_next, changes_over
 from mbsim.integrators.control import (
     HOLD,
     extrapolated_factor,
@@ -66,7 +66,6 @@ from mbsim.integrators.scheme import (
     HAVE_F,
     HAVE_JACOBIAN,
     HORIZON,
-    KEEPS_TO_BOUND,
     LAST_ERROR,
     LAST_REASON,
     LAST_STEP,
@@ -98,7 +97,6 @@ from mbsim.integrators.scheme import (
     note_failure,
     project,
 )
-from mbsim.integrators.stability import keep_to_bound, stay_within
 
 #: Where steps are cut one after another, whole ones grow so much at most.
 CUT_GROW = 2.0
@@ -379,6 +377,7 @@ def advance(  # noqa: C901
         m.memory[CHANGE_DUE] = 0.0
         return CHANGES_OVER
     stop_at = m.counts[EVALUATIONS] + budget
+    # which method serves best is a matter of the run, not of how far its caller steps at once
     run_end = max(t_end, m.memory[RUN_END])
     while m.memory[TIME] < t_end:
         if m.counts[EVALUATIONS] >= stop_at:
@@ -460,10 +459,8 @@ def advance(  # noqa: C901
             m.memory[STEP] = max(m.memory[STEP], behind)
         m.memory[STEP] = max(m.memory[STEP], m.memory[CUT_FROM])
         m.memory[CUT_FROM] = 0.0
-        if is_bounded(m) and not steps.implicit:
-            stay_within(m, most, uncut)
-        elif m.memory[KEEPS_TO_BOUND] == 1.0:
-            keep_to_bound(m, most, uncut)
+        if not steps.implicit:
+            bound_next(m, most, uncut)
         m.memory[WAS_CUT] = 1.0 if h < whole else 0.0
         word = accept(p, m, steps, t, h, asked)
         arrive_at(m, t, h, h < whole and h == m.memory[HORIZON] - t, t_end)

@@ -107,7 +107,12 @@ HITS = 69
 AT_ONCE = 70
 # when the run ends, as far as its caller knows: steps are asked for up to nearer times
 RUN_END = 71
-MEMORY = 72
+# of an explicit method: for how many steps still one that was at the bound is remembered; after how
+# many windows within the bound the next one goes beyond
+AT_BOUND, WAIT = range(72, 74)
+# of AUTO: what part of a step that the error would allow those at the bound of stability are
+PART = 74
+MEMORY = 75
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)

@@ -2,10 +2,14 @@
 
 The error lets steps beyond the bound of stability pass as long as what they amplify is within the
 tolerance. What is amplified is then rejected, or shaken: friction that turns sign from step to
-step, what rests that trembles. Where a method runs alone, steps within the bound are mostly fewer
-in all, and a looser tolerance takes about as many. Not where friction shakes within a loose
-tolerance and the motion hardly sees it: there steps that are many times as long go on. Which of the
-two goes farther for its evaluations is found by trying: a window of the other kind, now and then.
+step, what rests that trembles. Steps within the bound are mostly fewer in all. Their error is far
+below any tolerance but where something trembles. A loose one lets that go on for good, and what
+trembles leaves and touches, in steps that are shorter than the bound: within it the error may be no
+more than a tolerance of CALM allows, and a looser one takes as many steps.
+
+Not where friction shakes within a loose tolerance and the motion hardly sees it: there steps that
+are many times as long go on. Which of the two goes farther for its evaluations is found by trying:
+a window of the other kind, now and then.
 """
 
 from __future__ import annotations
@@ -17,6 +21,7 @@ from mbsim.core.arrays import F2
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import EACH, POSITION, RATES, Problem
 from mbsim.integrators.scheme import (
+    AT_BOUND,
     EVALUATIONS,
     FREE,
     LAST_ERROR,
@@ -26,6 +31,8 @@ from mbsim.integrators.scheme import (
     STEP,
     STIFFNESS,
     TIME,
+    TOL,
+    WAIT,
     WINDOW_STEPS,
     WINDOW_STIFF,
     WINDOW_TIME,
@@ -41,11 +48,17 @@ BOUND, WITHIN = 1.6, 1.8
 #: A step below this error, over the allowed one, moves nothing that the rate could be of.
 NOTHING = 1e-10
 #: Evaluations over which it is found how far steps go, what part of these is at the bound where it
-#: is that which bounds them, and windows until the other kind is tried again: from steps beyond the
-#: bound soon, for motions that stick and slip in turn look like others for a while.
-WINDOW, STIFF_PART, SOON, AGAIN = 250, 0.1, 12, 40
+#: is that which bounds them, and windows until the other kind is tried: from steps beyond the bound
+#: soon, for motions that stick and slip in turn look like others for a while. What steps beyond it
+#: shake, in vain, takes some windows to come to rest: each time it is tried half as often; where it
+#: paid, at once.
+WINDOW, STIFF_PART, SOON, FIRST = 250, 0.1, 12.0, 16.0
 #: Steps within the bound are taken though they go by so much less far: they shake nothing.
 CALMER = 0.5
+
+#: The most of tol for steps within the bound, and for how many of them one at the bound says so:
+#: what trembles shows its rate now and then.
+CALM, REMEMBERED = 1e-3, 40.0
 
 #: From so many times the change of f over a step, between its last two stages, a rate is hidden,
 #: if the estimate is below what shows it and the error, over the allowed one, bounds the step.
@@ -105,6 +118,22 @@ def rate_between(p: Problem, m: Method, t: float, h: float, size: F2) -> float:
 
 
 @jitable
+def allowed(m: Method) -> float:
+    """Return the error that a step may have: tol, or less where it is to stay within the bound."""
+    calm = m.memory[AT_BOUND] > 0.0 and m.memory[FREE] == 0.0
+    return min(m.memory[TOL], CALM) if calm else m.memory[TOL]
+
+
+@jitable
+def note_bound(m: Method, error: float) -> None:
+    """Remember a step of this error that was at the bound of stability, and forget earlier ones."""
+    if m.memory[STIFFNESS] > BOUND and error > NOTHING:
+        m.memory[AT_BOUND] = REMEMBERED
+    else:
+        m.memory[AT_BOUND] = max(0.0, m.memory[AT_BOUND] - 1.0)
+
+
+@jitable
 def stay_within(m: Method, h: float, error: float) -> None:
     """Let the step after one of length h and this error end within the bound of stability.
 
@@ -132,12 +161,12 @@ def judge_window(m: Method) -> None:
     if m.memory[WINDOW_STIFF] < STIFF_PART * m.memory[WINDOW_STEPS]:
         # the error bounds them: nothing that was found holds any more
         m.memory[PACE_FREE] = m.memory[PACE_WITHIN] = m.memory[FREE] = m.memory[WINDOWS] = 0.0
-    elif min(m.memory[PACE_FREE], m.memory[PACE_WITHIN]) == 0.0 or m.memory[WINDOWS] >= (
-        SOON if m.memory[FREE] == 1.0 else AGAIN
-    ):
+    elif m.memory[WINDOWS] >= (SOON if m.memory[FREE] == 1.0 else m.memory[WAIT]):
         m.memory[FREE], m.memory[WINDOWS] = 1.0 - m.memory[FREE], 0.0
     else:
         within = m.memory[PACE_WITHIN] >= CALMER * m.memory[PACE_FREE]
+        if m.memory[FREE] == 1.0:
+            m.memory[WAIT] = max(FIRST, 2.0 * m.memory[WAIT]) if within else 1.0
         m.memory[FREE] = 0.0 if within else 1.0
 
 
@@ -146,6 +175,7 @@ def keep_to_bound(m: Method, h: float, error: float) -> None:
     """Let the step after one of length h and this error keep to the bound, where that pays."""
     if m.memory[WINDOW_WORK] == 0.0:
         begin_window(m)
+        m.memory[WAIT] = FIRST
     m.memory[WINDOW_STEPS] += 1.0
     if m.memory[STIFFNESS] > BOUND and error > NOTHING:
         m.memory[WINDOW_STIFF] += 1.0

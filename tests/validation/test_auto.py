@@ -11,6 +11,7 @@ import mbsim
 from helpers.decks import COULOMB, GRAVITY, GROUND, contact, run_deck, sphere
 from helpers.folders import MODELS
 from mbsim.errors import ModelError
+from mbsim.integrators.changing import IMPLICIT_WORK
 
 STIFF = MODELS / "stiff"
 
@@ -96,6 +97,21 @@ def test_what_did_not_pay_is_not_tried_again_and_again():
 def test_an_impact_or_a_short_stiff_run_changes_nothing(name):
     auto = mbsim.simulate(mbsim.read_model(MODELS / f"{name}.xml"))
     assert auto.stats["method_changes"] == auto.stats["jacobians"] == 0
+
+
+@pytest.mark.parametrize("name", ["sliding_block", "pendulum_wheel", "contensou_disc", "cam"])
+def test_a_short_run_changes_over_where_radau5_takes_far_less(name):
+    """Fewer than 2000 steps were ahead: they took 1.4 to 4.7 times RADAU5's work.
+
+    What slides or rests is smooth at the bound of stability; the cam has some 1000 steps ahead.
+    """
+    model = mbsim.read_model(MODELS / f"{name}.xml")
+    auto, explicit = (
+        mbsim.simulate(model, integrator=method, tol=1e-4).stats for method in ("AUTO", "DOPRI5")
+    )
+    work = auto["rhs_evaluations"] + auto["jacobians"]
+    work += (IMPLICIT_WORK - 1.0) * (auto["implicit_evaluations"] + auto["jacobians"])
+    assert work < 0.7 * explicit["rhs_evaluations"]
 
 
 @pytest.mark.parametrize(("name", "part"), [("torsion_top", 0.05), ("bushing_chain", 0.4)])
@@ -215,14 +231,20 @@ def test_what_rests_on_strong_dampers_does_not_shake_at_a_loose_tolerance(tmp_pa
         assert abs(here - there) < 1e-6
 
 
-@pytest.mark.parametrize("name", ["lugre_stick_slip", "belt_stick_slip"])
-def test_stick_and_slip_in_turn_are_stiff_again_at_once(name):
+@pytest.mark.parametrize(
+    ("name", "tol"),
+    [("lugre_stick_slip", 1e-5), ("belt_stick_slip", 1e-5), ("belt_stick_slip", 1e-2)],
+)
+def test_stick_and_slip_in_turn_are_stiff_again_at_once(name, tol):
     """Between phases of slip AUTO waited longer each time: 2.7 times RADAU5's evaluations.
 
-    Where the rate is measured it does not leave `lugre_stick_slip` at all.
+    Where the rate is measured it does not leave `lugre_stick_slip` at all. Asked of the short steps
+    around a switch alone it left the belt nine times at 1e-2: 2.5 times the evaluations.
     """
     model = mbsim.read_model(MODELS / f"{name}.xml")
-    auto, stiff = (mbsim.simulate(model, integrator=method) for method in ("AUTO", "RADAU5"))
+    auto, stiff = (
+        mbsim.simulate(model, integrator=method, tol=tol) for method in ("AUTO", "RADAU5")
+    )
     assert auto.stats["method_changes"] >= 1
     assert auto.stats["rhs_evaluations"] < 1.5 * stiff.stats["rhs_evaluations"]
 
@@ -335,16 +357,17 @@ def test_too_many_bodies_are_said(monkeypatch):
 
 
 @pytest.mark.parametrize("method", ["DOPRI5", "DOP853"])
-@pytest.mark.parametrize(
-    ("deck", "most"), [("sdnd100", 2.0), ("belt_stick_slip", 1.5), ("belt_weakening", 1.6)]
-)
-def test_explicit_methods_take_about_as_much_at_a_looser_tolerance(method, deck, most):
-    """Beyond the bound of stability friction shook: sdnd100 took ten times as many at 1e-4."""
+@pytest.mark.parametrize("deck", ["sdnd100", "belt_stick_slip", "belt_weakening", "bowling_ball"])
+def test_explicit_methods_take_no_more_at_a_looser_tolerance(method, deck):
+    """What rested trembled at its bound of stability, and was thrown, within a loose tolerance.
+
+    sdnd100 took ten times as many at 1e-4, and at 1e-2 as at 1e-3 the belts 1.4, the ball 1.6.
+    """
     model = mbsim.read_model(MODELS / f"{deck}.xml")
     work = [
         mbsim.simulate(model, integrator=method, tol=tol).stats["rhs_evaluations"]
         for tol in (1e-5, 1e-4, 1e-3, 1e-2)
     ]
     for tighter, looser in itertools.pairwise(work):
-        assert looser < most * tighter
+        assert looser < 1.15 * tighter
     assert max(work) < 2.0 * min(work)
