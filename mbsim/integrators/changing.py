@@ -123,7 +123,7 @@ def is_bounded(m: Method) -> bool:
 
 @jitable
 def bound_next(m: Method, h: float, error: float) -> None:
-    """Let the explicit step after one of length h and this error keep to the bound, where it has to."""
+    """Let the explicit step after one of length h and this error keep to the bound if it has to."""
     note_bound(m, error)
     if is_bounded(m):
         stay_within(m, h, error)
