@@ -35,7 +35,7 @@ from mbsim.arrays.codes import (
 from mbsim.arrays.hooks import FclPoints, Hook, Recall, answer_of
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_float, call_int
-from mbsim.core.arrays import F1
+from mbsim.core.arrays import F1, F2
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, norm, rotate, sub, unrotate, vector
 from mbsim.dynamics.bodies.kinematics import position
@@ -366,9 +366,8 @@ def commit_gaps(scene: Scene, y: F1) -> None:
 
 
 @jitable
-def exchange(scene: Scene, a: int, b: int, step: int) -> None:
+def exchange(points: F2, a: int, b: int, step: int) -> None:
     """Exchange the rows of two incidents."""
-    points = scene.work.points
     for r in range(step):
         for c in range(points.shape[1]):
             points[a + r, c], points[b + r, c] = points[b + r, c], points[a + r, c]
@@ -382,25 +381,34 @@ def same_place(scene: Scene, pair: int) -> float:
 
 
 @jitable
-def pass_on(scene: Scene, pair: int) -> None:
-    """Give what a corner has become behind an edge the slot that the corner had.
+def pass_on(scene: Scene, pair: int, points: F2, at: int) -> None:
+    """Give incidents of a pair, whose rows of points begin `at` one, the slots that were there.
 
-    A row that is an incident where it is committed to be one is the same. One that is not takes
-    the slot of one that was, at its place.
+    What a corner becomes behind an edge has another row, and what came from elsewhere may have the
+    one that it had: those nearest to each other come first. What is not at a place that was touched
+    keeps to its row.
     """
-    first, state, points = scene.pairs.slot[pair], scene.state, scene.work.points
-    last = first + scene.kinds.slots[scene.pairs.kind[pair]]
-    for k in range(first, last):
-        if points[k, AT_DEPTH] <= 0.0 or state.touching[k] == 1:
-            continue
-        slot, least = -1, same_place(scene, pair)
-        for s in range(first, last):
-            if state.touching[s] == 1 and points[s, AT_DEPTH] <= 0.0:
-                way = norm(sub(vector(points[k, AT_POINT:]), vector(state.p[s])))
+    first, state, left = scene.pairs.slot[pair], scene.state, scene.pairs.touches[pair]
+    count, near = scene.kinds.slots[scene.pairs.kind[pair]], same_place(scene, pair)
+    settled = 0  # bits of slots that have their incident
+    while left > 0:
+        slot, incident, least = -1, -1, near
+        for s in range(count):
+            if state.touching[first + s] == 0 or settled >> s & 1:
+                continue
+            for k in range(count):
+                # a row that has no place has no depth either; one that has just left has one
+                if points[at + k, AT_DEPTH] == 0.0 or settled >> k & 1:
+                    continue
+                way = norm(sub(vector(points[at + k, AT_POINT:]), vector(state.p[first + s])))
                 if way < least:
-                    slot, least = s, way
-        if slot >= 0:
-            exchange(scene, slot, k, 1)
+                    slot, incident, least = s, k, way
+        if slot < 0:
+            return
+        if slot != incident:
+            exchange(points, at + slot, at + incident, 1)
+        settled |= 1 << slot
+        left -= 1
 
 
 @jitable
@@ -414,7 +422,7 @@ def keep_slots(scene: Scene, pair: int) -> None:
     if pairs.touches[pair] == 0:
         return
     if scene.kinds.moves[pairs.kind[pair]] == HELD_AT_PLACES:
-        pass_on(scene, pair)
+        pass_on(scene, pair, work.points, pairs.slot[pair])
         return
     kind, first = pairs.kind[pair], pairs.slot[pair]
     step, last = scene.kinds.step[kind], first + scene.kinds.slots[kind]
@@ -434,6 +442,6 @@ def keep_slots(scene: Scene, pair: int) -> None:
         if slot < 0:
             return
         if slot != incident:
-            exchange(scene, slot, incident, step)
+            exchange(work.points, slot, incident, step)
         settled |= 1 << ((slot - first) // step)
         left -= 1

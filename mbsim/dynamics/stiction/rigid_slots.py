@@ -22,9 +22,9 @@ from mbsim.dynamics.bodies.kinematics import place_body, place_graphic
 from mbsim.dynamics.constraints.selection import sticks
 from mbsim.dynamics.contact.forces import contact_of, sides
 from mbsim.dynamics.contact.frames import tangent
-from mbsim.dynamics.contact.points import same_place
+from mbsim.dynamics.contact.points import pass_on
 from mbsim.dynamics.stiction.rigid_shares import first_of_slots
-from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, axis
+from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT, axis
 
 #: Half of the time over which rates of a contact's place are found, over that in which the model's
 #: speed goes its length: truncation and rounding are about as large.
@@ -85,6 +85,8 @@ def look(scene: Scene, y: F1, pair: int, row: int) -> None:
         for s in range(kinds.slots[kind]):
             for k in range(4, 7):
                 points[s, k] = -points[s, k]
+    if kinds.moves[kind] == HELD_AT_PLACES:
+        pass_on(scene, pair, points, 0)
 
 
 @jitable
@@ -106,41 +108,32 @@ def look_around(scene: Scene, y: F1, pair: int, moment: float) -> None:
 
 
 @jitable
-def holding_row(scene: Scene, s: int) -> int:
-    """Return the candidate where slot s holds: its own, or what has taken over where that was.
-
-    A corner that passes an edge is another row's from there on. What holds it holds on at its
-    place.
-    """
-    points, pair = scene.work.look[LOOKED_NOW], scene.slots.pair[s]
-    first = scene.pairs.slot[pair]
-    best, p, least = s - first, vector(scene.state.p[s]), same_place(scene, pair)
-    # a row that has no place has no depth either; one that has just left has one
-    if points[best, AT_DEPTH] != 0.0:
-        return best
-    for q in range(scene.kinds.slots[scene.pairs.kind[pair]]):
-        if points[q, AT_DEPTH] == 0.0 or scene.state.touching[first + q] == 1:
-            continue
-        away = norm(sub(vector(points[q, AT_POINT:]), p))
-        if away < least:
-            best, least = q, away
-    return best
-
-
-@jitable
 def face_body(scene: Scene, s: int) -> int:
     """Return the body whose face slot s is held along."""
     return scene.graphics.body[scene.pairs.graphic_j[scene.slots.pair[s]]]
 
 
 @jitable
-def face_towards(scene: Scene, pair: int, n: V3) -> V3:
-    """Return the normal of the kernel's J that is next to n.
+def common_normal(scene: Scene, pair: int) -> V3:
+    """Return the sum of the normals of a pair that has been looked at, each by its weight.
+
+    Of two edges that are next to parallel it has no say: their normal may be any that is across.
+    """
+    points, n = scene.work.look[LOOKED_NOW], (0.0, 0.0, 0.0)
+    for k in range(scene.kinds.slots[scene.pairs.kind[pair]]):
+        if points[k, AT_DEPTH] > 0.0:
+            n = add(n, scale(points[k, AT_WEIGHT], vector(points[k, AT_NORMAL:])))
+    return n
+
+
+@jitable
+def face_towards(scene: Scene, pair: int) -> V3:
+    """Return the normal of the face of the kernel's J that a pair is held along.
 
     A corner behind an edge has the normal of edges in place of that of a face, off by the tilt of
     both faces: held along each in turn it would be driven over the edge and back.
     """
-    frame = scene.work.frames[scene.pairs.graphic_j[pair]]
+    frame, n = scene.work.frames[scene.pairs.graphic_j[pair]], common_normal(scene, pair)
     best = axis(frame, 0)
     for k in range(1, 3):
         if abs(dot(axis(frame, k), n)) > abs(dot(best, n)):
@@ -152,7 +145,7 @@ def face_towards(scene: Scene, pair: int, n: V3) -> V3:
 def fill_hold(scene: Scene, t: float, y: F1, s: int, moment: float) -> None:
     """Fill the row of `Work.sticking_point` of slot s, whose pair has been looked at."""
     points, row = scene.work.look, scene.work.sticking_point[s]
-    k = holding_row(scene, s)
+    k = s - scene.pairs.slot[scene.slots.pair[s]]
     now, later, before = points[0, k], points[1, k], points[2, k]
     ahead = sub(vector(later[AT_POINT:]), vector(now[AT_POINT:]))
     back = sub(vector(now[AT_POINT:]), vector(before[AT_POINT:]))
@@ -168,7 +161,7 @@ def fill_hold(scene: Scene, t: float, y: F1, s: int, moment: float) -> None:
     gi, gj = sides(scene, s)
     bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
     if level == HELD_AT_PLACES:
-        n = face_towards(scene, scene.slots.pair[s], n)
+        n = face_towards(scene, scene.slots.pair[s])
     x = tangent(scene, t, y, s, contact_of(scene, s), gi, bi, bj, n)
     for i in range(3):
         row[HELD_POINT + i], row[HELD_NORMAL + i], row[HELD_AXIS + i] = (
