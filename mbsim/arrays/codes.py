@@ -303,9 +303,10 @@ SPARE = 24 + SLOT_COLUMNS
 #: How a friction law is asked on a rim (`contact.rims`): at its points, all round it, at a place
 #: for each point; and how many numbers of a law's memory are a stretch.
 AT_POINTS, AROUND_RIM, AT_PLACES = range(3)
-#: `Kinds.moves`: rows are parts of a shape, so that incidents keep them; they are none; or they
-#: are, but friction that sticks is held at a place, which has another row behind an edge.
-AT_ROWS, NO_ROWS, HELD_AT_PLACES = range(3)
+#: `Kinds.moves`: rows are parts of a shape, so that incidents keep them; they are, and friction
+#: that sticks is held along J, a plane; they are none; or they are, but what sticks is held along
+#: J's face, at a place that has another row behind an edge.
+AT_ROWS, ON_PLANE, NO_ROWS, HELD_AT_PLACES = range(4)
 STRETCH = 2
 # columns of `Rows.contact`, of each contact; force and torque take three
 CONTACT_FORCE, CONTACT_TORQUE, CONTACT_DEPTH, CONTACT_SLIP = 0, 3, 6, 7

@@ -17,6 +17,7 @@ from mbsim.arrays.codes import (
     AT_ROWS,
     HELD_AT_PLACES,
     NO_ROWS,
+    ON_PLANE,
     STRETCH,
 )
 from mbsim.arrays.model import Contacts, Graphics, Kinds, Slots
@@ -149,8 +150,9 @@ def graphics_table(
     return made
 
 
-#: Pairs whose corner has another row behind an edge of the other shape.
-PASSED_ON = frozenset({"BOX-BOX"})
+#: Pairs whose points lie in a face of J: corners of a flat shape on a plane, and those whose corner
+#: has another row behind an edge of the other shape.
+HELD_ALONG = {"BOX-PLANE": ON_PLANE, "BOX-BOX": HELD_AT_PLACES}
 
 
 def _face_weight(kind: Kind) -> float:
@@ -171,7 +173,7 @@ def _moves(kind: Kind, sticks: bool) -> int:
     """Return whether incidents of a kind keep their slots by place, as in `Kinds`."""
     if kind.moves:
         return NO_ROWS
-    return HELD_AT_PLACES if sticks and kind.closed_form in PASSED_ON else AT_ROWS
+    return HELD_ALONG.get(kind.closed_form, AT_ROWS) if sticks else AT_ROWS
 
 
 def kinds_table(kinds: list[Kind], contacts: dict[int, int], sticks: Set[int]) -> Kinds:

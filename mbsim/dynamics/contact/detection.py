@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import ACTIVE, AT_ROWS, FCL_CALLS, NARROWPHASE, SKIPPED, WANTED
+from mbsim.arrays.codes import ACTIVE, FCL_CALLS, NARROWPHASE, ON_PLANE, SKIPPED, WANTED
 from mbsim.arrays.hooks import Hook, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
@@ -27,7 +27,7 @@ from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, COUPLE, axis
 @jitable
 def keep_places(scene: Scene, pair: int) -> None:
     """Let incidents that are no parts of a shape keep their slots."""
-    if scene.kinds.moves[scene.pairs.kind[pair]] != AT_ROWS:
+    if scene.kinds.moves[scene.pairs.kind[pair]] > ON_PLANE:
         note_failure(scene, call_int(scene.world.hooks[Hook.SLOTS], (scene, pair)))
 
 

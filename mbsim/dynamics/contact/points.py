@@ -12,7 +12,6 @@ from mbsim.arrays.codes import (
     ACTIVE,
     APPROACH,
     AT_FAULT,
-    AT_ROWS,
     BEYOND_I,
     BEYOND_J,
     BEYOND_TIME,
@@ -25,6 +24,7 @@ from mbsim.arrays.codes import (
     HELD_AT_PLACES,
     LEAVE,
     NO_ROWS,
+    ON_PLANE,
     REBOUND,
     SCALE_LENGTH,
     TOO_DEEP,
@@ -263,7 +263,7 @@ def commit_slot(scene: Scene, t: float, h: float, y: F1, s: int) -> int:
         state.depth[s] = work.slot[s, DEPTH]
         state.rate[s] = work.slot[s, RATE]
         state.normal[s] = work.slot[s, NORMAL]
-        placed = scene.kinds.moves[kind] != AT_ROWS
+        placed = scene.kinds.moves[kind] > ON_PLANE
         framed = scene.contacts.framed[contact_of(scene, s)] == 1
         if scene.world.fixed_step[0] == 0 or framed or placed:
             for k in range(3):

@@ -22,6 +22,7 @@ from mbsim.arrays.codes import (
     SIDE,
     SLIDER_STATIC,
     SLIDES,
+    TOLERANCE,
     WHOLE_X,
     WHOLE_Y,
 )
@@ -101,11 +102,16 @@ def leaves_branch(scene: Scene) -> bool:
 def some_left(scene: Scene) -> bool:
     """Return whether an incident with modes of the committed state is none at the point evaluated.
 
-    One that was no deeper than rounding of its place has not left.
+    One that was no deeper than rounding of its place has not left, and one that pressed less than
+    the tolerance of what presses most leaves nothing.
     """
-    state, work = scene.state, scene.work
+    state, work, most = scene.state, scene.work, 0.0
+    for k in range(state.hit[len(state.hit) - 1]):
+        most = max(most, state.normal[state.hit[k]])
     for k in range(state.hit[len(state.hit) - 1]):
         s = state.hit[k]
+        if state.normal[s] < scene.world.scale[TOLERANCE] * most:
+            continue
         if work.touching[s] == 0 and state.mode[s] % BRANCHES > 0.0:
             if work.slot[s, DEPTH] > RESOLVED * norm(vector(work.points[s, AT_POINT:])):
                 return True

@@ -24,12 +24,13 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1, V2
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import cross, dot, sub, vector
+from mbsim.core.rotation import cross, dot, vector
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.selection import LEVER, fill_size, sticks
-from mbsim.dynamics.contact.forces import FORCE, contact_of, sides, velocity_at
+from mbsim.dynamics.contact.forces import FORCE, contact_of
 from mbsim.dynamics.contact.points import record_event
 from mbsim.dynamics.stiction.cones import CAPACITY, MOVES, SHARED, SLIDE, SLIPPING, solve_cones
+from mbsim.dynamics.stiction.faces import holds_nothing, slip_of
 from mbsim.dynamics.stiction.rigid_friction import AT_REST, ROUNDING
 from mbsim.dynamics.stiction.rigid_shares import (
     SLIDING,
@@ -44,7 +45,7 @@ from mbsim.dynamics.stiction.rigid_shares import (
     share_sticking,
 )
 from mbsim.dynamics.stiction.rigid_slots import MOMENT, fill_hold, locate_sticking, look_around
-from mbsim.geometry.catalog import AT_NORMAL, AT_POINT
+from mbsim.geometry.catalog import AT_NORMAL
 from mbsim.laws.catalog import BEGUN, SLIP, STICK
 from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_PLAY, KEPT_SPEED, KEPT_X, KEPT_Y
 
@@ -59,20 +60,6 @@ BEYOND = 3.0
 #: Slots that slip are sought with limits that are lower by this part: where they are just reached
 #: accelerations are 0, and do not tell the way.
 OVER = 1e-5
-
-
-@jitable
-def slip_of(scene: Scene, y: F1, s: int) -> V2:
-    """Return slip along x and y of slot s at the point evaluated last."""
-    gi, gj = sides(scene, s)
-    point = scene.work.points[s]
-    p, n = vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
-    v = sub(
-        velocity_at(scene, y, scene.graphics.body[gi], p),
-        velocity_at(scene, y, scene.graphics.body[gj], p),
-    )
-    tx = vector(scene.work.t[s])
-    return dot(v, tx), dot(v, cross(n, tx))
 
 
 @jitable
@@ -123,7 +110,9 @@ def ask_sticking(scene: Scene, y: F1) -> int:
     slot = scene.equations.slot
     for e in range(first_of_slots(scene), len(slot), 2):
         s = slot[e]
-        if scene.work.touching[s] == 1 and scene.state.memory[s, KEPT_MODE] == SLIP:
+        if scene.work.touching[s] == 0 or holds_nothing(scene, s):
+            continue
+        if scene.state.memory[s, KEPT_MODE] == SLIP:
             if goes_back(scene, s, onward(scene, s, slip_of(scene, y, s))):
                 return 1
     return 0
@@ -183,6 +172,14 @@ def begin_slot(scene: Scene, y: F1, s: int) -> int:
 
 
 @jitable
+def let_follow(scene: Scene, y: F1, s: int) -> None:
+    """Let slot s slip as the rest moves, which it does not hold: it tells of no event."""
+    v = slip_of(scene, y, s)
+    speed = math.hypot(v[0], v[1])
+    let_slip(scene, s, v[0] if speed > 0.0 else 1.0, v[1], max(speed, rest(scene)), 0.0)
+
+
+@jitable
 def came_to_rest(scene: Scene, group: int) -> bool:
     """Return whether a slot sticks that did not, of a group of bodies that are connected."""
     slot = scene.equations.slot
@@ -213,7 +210,9 @@ def begin_sticking(scene: Scene, y: F1) -> int:
     for e in range(first, len(slot), 2):
         s = slot[e]
         mode = state.memory[s, KEPT_MODE]
-        if state.touching[s] == 1 and mode != STICK:
+        if state.touching[s] == 1 and holds_nothing(scene, s):
+            let_follow(scene, y, s)
+        elif state.touching[s] == 1 and mode != STICK:
             begun = max(begun, 1 if mode == BEGUN else 0)
             changed = max(changed, begin_slot(scene, y, s))
         mode = state.memory[s, KEPT_MODE]
@@ -225,7 +224,9 @@ def begin_sticking(scene: Scene, y: F1) -> int:
         return 0
     for e in range(first, len(slot), 2):
         s = slot[e]
-        if state.memory[s, KEPT_MODE] == SLIP and state.touching[s] == 1:
+        if state.touching[s] == 0 or holds_nothing(scene, s):
+            continue
+        if state.memory[s, KEPT_MODE] == SLIP:
             v, least = slip_of(scene, y, s), AT_REST * rest(scene)
             if came_to_rest(scene, group_of(scene, s)):
                 least = max(least, settled(scene))
@@ -253,6 +254,8 @@ def hold_implied(scene: Scene, t: float, y: F1) -> None:
         kept = scene.state.memory[s]
         released = kept[KEPT_MODE] == SLIP and kept[KEPT_SPEED] == 0.0
         if scene.state.touching[s] == 0 or kept[KEPT_MODE] == STICK or released:
+            continue
+        if holds_nothing(scene, s):
             continue
         look_around(scene, y, scene.slots.pair[s], moment)
         fill_hold(scene, t, y, s, moment)
@@ -380,6 +383,9 @@ def record_sticking(scene: Scene, t: float, y: F1) -> None:
         if state.touching[s] == 0:
             before[KEPT_MODE] = BEGUN
             kept[KEPT_X] = rest(scene) + settled(scene)
+            continue
+        if holds_nothing(scene, s):
+            state.mode[s] = kept[KEPT_MODE]
             continue
         if kept[KEPT_MODE] == SLIP and kept[KEPT_SPEED] == 0.0:
             keep_play(scene, y, s)

@@ -14,17 +14,18 @@ from mbsim.arrays.codes import (
 )
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
-from mbsim.core.arrays import F1, V3
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_body, place_graphic
 from mbsim.dynamics.constraints.selection import sticks
-from mbsim.dynamics.contact.forces import contact_of, sides
+from mbsim.dynamics.contact.forces import contact_of, sides, velocity_at
 from mbsim.dynamics.contact.frames import tangent
 from mbsim.dynamics.contact.points import pass_on
+from mbsim.dynamics.stiction.faces import above, as_normal, face_of, has_face
 from mbsim.dynamics.stiction.rigid_shares import first_of_slots
-from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT, axis
+from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT
 
 #: Half of the time over which rates of a contact's place are found, over that in which the model's
 #: speed goes its length: truncation and rounding are about as large.
@@ -108,37 +109,33 @@ def look_around(scene: Scene, y: F1, pair: int, moment: float) -> None:
 
 
 @jitable
-def face_body(scene: Scene, s: int) -> int:
-    """Return the body whose face slot s is held along."""
-    return scene.graphics.body[scene.pairs.graphic_j[scene.slots.pair[s]]]
+def fill_in_face(scene: Scene, t: float, y: F1, s: int) -> None:
+    """Bring the row of `Work.sticking_point` of slot s into the face that its pair is held along.
 
-
-@jitable
-def common_normal(scene: Scene, pair: int) -> V3:
-    """Return the sum of the normals of a pair that has been looked at, each by its weight.
-
-    Of two edges that are next to parallel it has no say: their normal may be any that is across.
+    One that has no place any more keeps the one that it had.
     """
-    points, n = scene.work.look[LOOKED_NOW], (0.0, 0.0, 0.0)
-    for k in range(scene.kinds.slots[scene.pairs.kind[pair]]):
-        if points[k, AT_DEPTH] > 0.0:
-            n = add(n, scale(points[k, AT_WEIGHT], vector(points[k, AT_NORMAL:])))
-    return n
-
-
-@jitable
-def face_towards(scene: Scene, pair: int) -> V3:
-    """Return the normal of the face of the kernel's J that a pair is held along.
-
-    A corner behind an edge has the normal of edges in place of that of a face, off by the tilt of
-    both faces: held along each in turn it would be driven over the edge and back.
-    """
-    frame, n = scene.work.frames[scene.pairs.graphic_j[pair]], common_normal(scene, pair)
-    best = axis(frame, 0)
-    for k in range(1, 3):
-        if abs(dot(axis(frame, k), n)) > abs(dot(best, n)):
-            best = axis(frame, k)
-    return best if dot(best, n) > 0.0 else scale(-1.0, best)
+    row, pair = scene.work.sticking_point[s], scene.slots.pair[s]
+    points, gj = scene.work.look[LOOKED_NOW], scene.pairs.graphic_j[pair]
+    b = scene.graphics.body[gj]
+    out, height = face_of(scene, pair, points, 0)
+    n, turns = as_normal(scene, pair, out), (0.0, 0.0, 0.0)
+    p, rate = vector(row[HELD_POINT:]), vector(row[POINT_RATE:])
+    if points[s - scene.pairs.slot[pair], AT_DEPTH] == 0.0:
+        p = vector(scene.state.p[s])
+        rate = velocity_at(scene, y, b, p)
+    if b < len(scene.bodies.mass):
+        turns = vector(scene.work.w[b])
+    z = above(scene, pair, p, out, height)
+    q = sub(p, scale(z, out))
+    # it stays in the face, which moves
+    rate = sub(rate, scale(z, cross(turns, out)))
+    rate = sub(rate, scale(dot(sub(rate, velocity_at(scene, y, b, q)), out), out))
+    dn, gi, other = cross(turns, n), sides(scene, s)[0], sides(scene, s)[1]
+    bi, bj = scene.graphics.body[gi], scene.graphics.body[other]
+    x = tangent(scene, t, y, s, contact_of(scene, s), gi, bi, bj, n)
+    for i in range(3):
+        row[HELD_POINT + i], row[HELD_NORMAL + i], row[HELD_AXIS + i] = q[i], n[i], x[i]
+        row[POINT_RATE + i], row[NORMAL_RATE + i] = rate[i], dn[i]
 
 
 @jitable
@@ -157,28 +154,22 @@ def fill_hold(scene: Scene, t: float, y: F1, s: int, moment: float) -> None:
             first, time = 0, moment
         else:
             last, time = 0, moment
-    n, level = vector(now[AT_NORMAL:]), scene.kinds.moves[scene.pairs.kind[scene.slots.pair[s]]]
-    gi, gj = sides(scene, s)
-    bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
-    if level == HELD_AT_PLACES:
-        n = face_towards(scene, scene.slots.pair[s])
-    x = tangent(scene, t, y, s, contact_of(scene, s), gi, bi, bj, n)
     for i in range(3):
-        row[HELD_POINT + i], row[HELD_NORMAL + i], row[HELD_AXIS + i] = (
-            now[AT_POINT + i],
-            n[i],
-            x[i],
-        )
+        row[HELD_POINT + i], row[HELD_NORMAL + i] = now[AT_POINT + i], now[AT_NORMAL + i]
         row[POINT_RATE + i] = (
             points[last, k, AT_POINT + i] - points[first, k, AT_POINT + i]
         ) / time
         row[NORMAL_RATE + i] = (
             points[last, k, AT_NORMAL + i] - points[first, k, AT_NORMAL + i]
         ) / time
-    if level == HELD_AT_PLACES:
-        turns = cross(vector(scene.work.w[face_body(scene, s)]), n)
-        for i in range(3):
-            row[NORMAL_RATE + i] = turns[i]
+    if has_face(scene, scene.slots.pair[s]):
+        fill_in_face(scene, t, y, s)
+        return
+    gi, gj = sides(scene, s)
+    bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
+    x = tangent(scene, t, y, s, contact_of(scene, s), gi, bi, bj, vector(now[AT_NORMAL:]))
+    for i in range(3):
+        row[HELD_AXIS + i] = x[i]
 
 
 @jitable
