@@ -160,10 +160,11 @@ class Sticking(IntEnum):
     SHARE = 1  # share the friction that holds between the contacts
     ASK = 2  # whether one asks for another mode than it has: 1, else 0
     LOAD = 3  # a million times the largest force that holds over its limit
-    BEGIN = 4  # modes at a committed state: 1 if one changed, else 0
-    RELEASE = 5  # let slip what is not held: how many do
-    RECORD = 6  # append events
-    CHANGED = 7  # whether other slots stick than in the last step: 1, else 0
+    LOAD_AT_MOST = 4  # no less, at less cost: nothing is shared
+    BEGIN = 5  # modes at a committed state: 1 if one changed, else 0
+    RELEASE = 6  # let slip what is not held: how many do
+    RECORD = 7  # append events
+    CHANGED = 8  # whether other slots stick than in the last step: 1, else 0
 
 
 class Memory(IntEnum):

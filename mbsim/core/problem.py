@@ -37,7 +37,8 @@ to the committed one before the run ends, but for codes from AT_ONCE on.
 |         |                        | a step that was taken, PASS_CUT, of one that was cut at a  |
 |         |                        | switch: 1 if one changed in it; LOAD: 1 if                 |
 |         |                        | friction holds something, the largest force by which it    |
-|         |                        | does over what it can in out[0]; BENDS (b: y committed): 1 |
+|         |                        | does over what it can in out[0]; LOAD_AT_MOST: no less, at |
+|         |                        | less cost; BENDS (b: y committed): 1                       |
 |         |                        | if HALF, at the step's middle, then HALVES, at its end,    |
 |         |                        | are to be asked: the error of a way followed in one, in    |
 |         |                        | the norm of errors, in out[0]; HIDES (b: y committed): 1   |
@@ -205,7 +206,7 @@ WATCH_EVERY = 5000
 # what `switching` is asked: whether sides differ, to keep them too, that a step was taken, loads;
 # and of friction that follows a way in closed form: whether that bends, then two halves of the
 # step; whether a side may have changed twice
-ASK, SETTLE, PASS, PASS_CUT, LOAD, BENDS, HALF, HALVES, HIDES = map(float, range(9))
+ASK, SETTLE, PASS, PASS_CUT, LOAD, LOAD_AT_MOST, BENDS, HALF, HALVES, HIDES = map(float, range(10))
 
 # reasons given to `reject`
 BY_ERROR, BY_CHECK, BY_NOT_FINITE, BY_NEWTON, BY_JUMP = range(5)

@@ -20,6 +20,7 @@ from mbsim.core.problem import (
     HALVES,
     HIDES,
     LOAD,
+    LOAD_AT_MOST,
     PASS,
     PASS_CUT,
     SETTLE,
@@ -27,8 +28,8 @@ from mbsim.core.problem import (
 )
 from mbsim.integrators.scheme import (
     AT_ONCE,
+    HOLDS,
     LAST_ERROR,
-    LOAD_THEN,
     LOOKS,
     REACH,
     SWITCH_CUT,
@@ -66,6 +67,9 @@ FARTHER = 10.0
 JUST_BEHIND = 1e-6
 #: How much the load of what friction holds may bend within a step, over its limit and sqrt(tol).
 BENT = 2.0
+#: At so many parts of a step the load is looked at; and how many times as far from the limit as it
+#: bends it has to stay to bend as it likes.
+LOADS, FAR = 4, 2.0
 
 
 @jitable
@@ -75,9 +79,12 @@ def ask_switching(p: Problem, m: Method, t: float, what: float, y: F1, b: F1) ->
 
 
 @jitable
-def load_of(p: Problem, m: Method, t: float, y: F1) -> float:
-    """Return the load of what friction holds at y, over its limit; -1 where it holds nothing."""
-    return m.error[0] if ask_switching(p, m, t, LOAD, y, m.error) == 1 else -1.0
+def load_of(p: Problem, m: Method, t: float, y: F1, what: float) -> float:
+    """Return the load of what friction holds at y, over its limit; -1 where it holds nothing.
+
+    `what`: LOAD, or LOAD_AT_MOST.
+    """
+    return m.error[0] if ask_switching(p, m, t, what, y, m.error) == 1 else -1.0
 
 
 @jitable
@@ -132,32 +139,40 @@ def first_switch(p: Problem, m: Method, t: float, h: float, whole: float, behind
 
 
 @jitable
-def load_at(p: Problem, m: Method, t: float, h: float, s: float) -> float:
-    """Return the load of what holds at the part s of the fitted step."""
-    interpolate(m, s, m.error)
-    return load_of(p, m, t + s * h, m.error)
+def loads_of(p: Problem, m: Method, t: float, h: float, what: float) -> tuple[float, float, float]:
+    """Return the largest load of what holds over the fitted step, how much it bends there, a part.
+
+    That is the first part of the step at which the load is above 1, and 1 for none. The problem is
+    left evaluated at the trial point.
+    """
+    begin, end = load_of(p, m, t, m.y, what), load_of(p, m, t + h, m.trial, what)
+    most, bent, passed = max(begin, end), 0.0, 1.0
+    for k in range(LOADS - 1, 0, -1):
+        s = k / LOADS
+        interpolate(m, s, m.error)
+        load = load_of(p, m, t + s * h, m.error, what)
+        most, bent = max(most, load), max(bent, abs(load - (1.0 - s) * begin - s * end))
+        if load > 1.0:
+            passed = s
+    load_of(p, m, t + h, m.trial, LOAD_AT_MOST)
+    return most, bent, passed
 
 
 @jitable
-def horizon_of(p: Problem, m: Method, t: float, h: float, begin: float) -> float:
+def horizon_of(p: Problem, m: Method, t: float, h: float) -> float:
     """Return the part of the fitted step over which the load of what holds is known, 1 for all.
 
     What holds does not move, so that the method's error says nothing of its load: that is to go
-    straight from `begin` to the trial point but for BENT sqrt(tol) of the limit, so that it cannot
-    pass the limit and come back unseen. What passes it there is cut off. The problem is left
-    evaluated at the trial point.
+    straight from its begin to the trial point but for BENT sqrt(tol) of the limit, so that it
+    cannot pass the limit and come back unseen, or for less than what it stays away from the limit.
+    What passes it there is cut off. The problem is left evaluated at the trial point.
     """
-    end = load_of(p, m, t + h, m.trial)
-    bent, passed = 0.0, 1.0
-    for k in range(3, 0, -1):
-        s = 0.25 * k
-        load = load_at(p, m, t, h, s)
-        bent = max(bent, abs(load - (1.0 - s) * begin - s * end))
-        if load > 1.0:
-            passed = s
-    load_of(p, m, t + h, m.trial)
+    most, bent, _ = loads_of(p, m, t, h, LOAD_AT_MOST)
+    if most + FAR * bent <= 1.0:
+        return 1.0
+    most, bent, passed = loads_of(p, m, t, h, LOAD)
     allowed = BENT * math.sqrt(m.memory[TOL])
-    if passed < 1.0 or bent <= allowed:
+    if passed < 1.0 or bent <= allowed or most + FAR * bent <= 1.0:
         return passed
     return max(0.1, 0.9 * math.sqrt(allowed / bent))
 
@@ -192,7 +207,7 @@ def hidden_side(p: Problem, m: Method, t: float, h: float) -> float:
 @jitable
 def look_at(p: Problem, m: Method, t: float, h: float) -> bool:
     """Ask for the branches at the trial point; return whether the step is to be looked into."""
-    m.memory[LOOKS], m.memory[LOAD_THEN] = 0.0, -1.0
+    m.memory[LOOKS], m.memory[HOLDS] = 0.0, 0.0
     if ask_switching(p, m, t + h, ASK, m.trial, m.error) > 0:
         m.memory[SWITCHED] = 1.0
         return True
@@ -203,16 +218,16 @@ def look_at(p: Problem, m: Method, t: float, h: float) -> bool:
         m.memory[LOOKS] += SIDES
     if ask_switching(p, m, t + h, BENDS, m.trial, m.y) > 0:
         m.memory[LOOKS] += WAYS
-    m.memory[LOAD_THEN] = load_of(p, m, t, m.y)
-    return m.memory[LOOKS] > 0.0 or m.memory[LOAD_THEN] >= 0.0
+    m.memory[HOLDS] = 1.0 if load_of(p, m, t + h, m.trial, LOAD_AT_MOST) >= 0.0 else 0.0
+    return m.memory[LOOKS] > 0.0 or m.memory[HOLDS] == 1.0
 
 
 @jitable
 def look_into(p: Problem, m: Method, t: float, h: float) -> None:
     """Look for what `look_at` asked for in the step, which is fitted."""
     looks = m.memory[LOOKS]
-    if m.memory[LOAD_THEN] >= 0.0:
-        m.memory[REACH] = horizon_of(p, m, t, h, m.memory[LOAD_THEN])
+    if m.memory[HOLDS] == 1.0:
+        m.memory[REACH] = horizon_of(p, m, t, h)
     if looks == SIDES or looks == SIDES + WAYS:
         m.memory[SWITCHED] = hidden_side(p, m, t, h)
     if looks >= WAYS and m.memory[SWITCHED] == 0.0:

@@ -90,10 +90,10 @@ LEFT_PART = 52
 BOUNDED = 53
 # of DOP853: where its last step tried began
 THIRD_AT = 54
-# of the step that was tried last: what is to be looked for within it, and the load of what holds at
-# its begin (`branches`); a part of it at which a force is on another branch, 0 for none, and how
-# much of it the load of what holds is known for
-LOOKS, LOAD_THEN, SWITCHED, REACH = range(55, 59)
+# of the step that was tried last: what is to be looked for within it, and whether friction holds
+# something there (`branches`); a part of it at which a force is on another branch, 0 for none, and
+# how much of it the load of what holds is known for
+LOOKS, HOLDS, SWITCHED, REACH = range(55, 59)
 # the most that the error of a step of order 2 may be, whatever tol is
 HELD = 59
 # of an explicit method alone (`stability.py`): whether it looks at its bound of stability, and goes

@@ -31,7 +31,7 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, vector_at, view
 from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import ASK, BENDS, HALF, HALVES, HIDES, LOAD, PASS, PASS_CUT
+from mbsim.core.problem import ASK, BENDS, HALF, HALVES, HIDES, LOAD, LOAD_AT_MOST, PASS, PASS_CUT
 from mbsim.core.rotation import norm, vector
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.constraints.in_use import is_friction
@@ -226,10 +226,11 @@ def watch_sticking(scene: Scene, t: float, y: F1, what: float) -> int:
 
 
 @jitable
-def load(scene: Scene, context: int, t: float, y: F1) -> float:
+def load(scene: Scene, context: int, t: float, y: F1, what: float) -> float:
     """Return the largest force by which friction without give holds, over its limit.
 
-    -1 where nothing is held so, and -1 too where modes are left to each evaluation.
+    No less than that where LOAD_AT_MOST is asked for. -1 where nothing is held so, and -1 too where
+    modes are left to each evaluation.
     """
     active, most = scene.equations.active, -1.0
     for r in range(active[len(active) - 1]):
@@ -244,7 +245,8 @@ def load(scene: Scene, context: int, t: float, y: F1) -> float:
             if not math.isnan(force):
                 most = max(most, abs(force) / scene.applied.par[f, SLIDER_STATIC])
     if scene.world.hooks[Hook.STICKING] != 0:
-        load = call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.LOAD, t, y))
+        asked = Sticking.LOAD if what == LOAD else Sticking.LOAD_AT_MOST
+        load = call_int(scene.world.hooks[Hook.STICKING], (scene, asked, t, y))
         most = max(most, 1e-6 * answer_of(scene, load))
     return most
 
@@ -466,8 +468,8 @@ def serve_switching(
 ) -> int:
     """Do what the hook `switching` is asked for; return its answer."""
     n = scene.rows.y.shape[1]
-    if what == LOAD:
-        b[0] = load(scene, context, t, vector_at(a, n))
+    if what == LOAD or what == LOAD_AT_MOST:
+        b[0] = load(scene, context, t, vector_at(a, n), what)
         return 1 if b[0] >= 0.0 else 0
     if what >= BENDS and scene.state.frozen[0] == 0:
         return 0

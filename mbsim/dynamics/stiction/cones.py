@@ -35,6 +35,8 @@ _GAP = 1e-10
 #: By what eps falls, and the least it falls to, as a part of the fastest slip at the begin.
 _FALL, LEAST = 0.03, 1e-10
 _MOST = 60
+#: What may be left of m, as a part of it, that forces do not hold.
+HELD = 1e-9
 #: A point is taken to slip where it moves so many times eps: it has its whole limit then.
 MOVES = 100.0
 
@@ -148,6 +150,35 @@ def begin_motion(S: F2, count: int, r: int, V: F2, K: F2, inertia: float) -> Non
         along += m[a] * y[a]
     for a in range(r):
         y[a] /= along
+
+
+@jitable
+def part_at_most(S: F2, count: int, r: int, V: F2, K: F2) -> float:
+    """Return the part of the limit that is needed by the forces that hold m with least sum f^2/c.
+
+    It is no less than rho of SHARED; arguments as of `solve_cones`. FORCE and SLIDE are lost.
+    """
+    y, m, u = V[MOTION], V[LOAD], V[SLIDE]
+    begin_motion(S, count, r, V, K, SHARED)
+    slides(S, count, r, y, u)
+    # y is along the motion wanted, which goes on m by what goes on m itself
+    for a in range(r):
+        V[GRADIENT, a] = 0.0
+    for k in range(0, count, 2):
+        for a in range(r):
+            V[GRADIENT, a] += V[CAPACITY, k // 2] * (u[k] * S[k, a] + u[k + 1] * S[k + 1, a])
+    held, square, left, part = 0.0, 0.0, 0.0, 0.0
+    for a in range(r):
+        held += m[a] * V[GRADIENT, a]
+        square += m[a] * m[a]
+    held /= square
+    for a in range(r):
+        left = max(left, abs(V[GRADIENT, a] - held * m[a]))
+    if left > HELD * held * math.sqrt(square):
+        return math.inf
+    for k in range(0, count, 2):
+        part = max(part, math.hypot(u[k], u[k + 1]) / held)
+    return part
 
 
 @jitable

@@ -26,7 +26,7 @@ from mbsim.core.arrays import F1, V2
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, vector
 from mbsim.dynamics.constraints.in_use import active_count
-from mbsim.dynamics.constraints.selection import LEVER, fill_size, sticks
+from mbsim.dynamics.constraints.selection import LEVER, fill_size
 from mbsim.dynamics.contact.forces import FORCE, contact_of
 from mbsim.dynamics.contact.points import record_event
 from mbsim.dynamics.stiction.cones import CAPACITY, MOVES, SHARED, SLIDE, SLIPPING, solve_cones
@@ -42,7 +42,9 @@ from mbsim.dynamics.stiction.rigid_shares import (
     first_of_slots,
     least_capacity,
     most_capacity,
+    part_at_most_of,
     share_sticking,
+    sticking_part,
 )
 from mbsim.dynamics.stiction.rigid_slots import MOMENT, fill_hold, locate_sticking, look_around
 from mbsim.geometry.catalog import AT_NORMAL
@@ -69,26 +71,6 @@ def settled(scene: Scene) -> float:
 
 
 @jitable
-def sticking_part(scene: Scene) -> float:
-    """Return the largest force that holds a slot over what holds at most: above 1 some must slip.
-
-    What presses next to nothing has no limit of its own.
-    """
-    slot, part, most = scene.equations.slot, 0.0, most_capacity(scene)
-    for e in range(first_of_slots(scene), len(slot), 2):
-        if not sticks(scene, e):
-            continue
-        along = scene.work.sticking_force[slot[e]]
-        able = max(capacity(scene, slot[e]), least_capacity(scene, slot[e], most))
-        force = math.hypot(along[0], along[1])
-        if able > 0.0:
-            part = max(part, force / able)
-        elif force > 0.0:
-            return math.inf
-    return part
-
-
-@jitable
 def onward(scene: Scene, s: int, v: V2) -> float:
     """Return the part of slip along the direction in which slot s began to slip."""
     kept = scene.state.memory[s]
@@ -103,10 +85,12 @@ def rest(scene: Scene) -> float:
 
 
 @jitable
-def ask_sticking(scene: Scene, y: F1) -> int:
+def ask_sticking(scene: Scene, t: float, y: F1) -> int:
     """Return 1 if a slot asks for another mode than it has, at the point evaluated last, else 0."""
-    if sticking_part(scene) > 1.0:
-        return 1
+    if part_at_most_of(scene, t, y) > 1.0:
+        share_sticking(scene, t, y)
+        if sticking_part(scene) > 1.0:
+            return 1
     slot = scene.equations.slot
     for e in range(first_of_slots(scene), len(slot), 2):
         s = slot[e]
@@ -119,9 +103,9 @@ def ask_sticking(scene: Scene, y: F1) -> int:
 
 
 @jitable
-def load_sticking(scene: Scene) -> int:
-    """Return the largest force that holds a slot, in millionths of what holds at most."""
-    return int(1e6 * min(sticking_part(scene), 1e6))
+def in_millionths(part: float) -> int:
+    """Return a part as an answer."""
+    return int(1e6 * min(part, 1e6))
 
 
 @jitable
@@ -423,8 +407,7 @@ def serve_sticking(scene: Scene, what: int, t: float, y: F1) -> int:
     elif what == Sticking.SHARE:
         share_sticking(scene, t, y)
     elif what == Sticking.ASK:
-        share_sticking(scene, t, y)
-        return ask_sticking(scene, y)
+        return ask_sticking(scene, t, y)
     elif what == Sticking.BEGIN:
         return begin_sticking(scene, y)
     elif what == Sticking.RELEASE:
@@ -435,5 +418,7 @@ def serve_sticking(scene: Scene, what: int, t: float, y: F1) -> int:
         return changed_sticking(scene)
     elif what == Sticking.LOAD:
         share_sticking(scene, t, y)
-        return load_sticking(scene)
+        return in_millionths(sticking_part(scene))
+    elif what == Sticking.LOAD_AT_MOST:
+        return in_millionths(part_at_most_of(scene, t, y))
     return 0

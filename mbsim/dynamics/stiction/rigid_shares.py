@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from mbsim.arrays.codes import CONE_ROWS, SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
@@ -13,7 +15,7 @@ from mbsim.dynamics.constraints.selection import sticks
 from mbsim.dynamics.constraints.tree import respond
 from mbsim.dynamics.contact.forces import FORCE, NORMAL, contact_of
 from mbsim.dynamics.contact.memory import slipping_mass
-from mbsim.dynamics.stiction.cones import CAPACITY, LOAD, SHARED, solve_cones
+from mbsim.dynamics.stiction.cones import CAPACITY, LOAD, SHARED, part_at_most, solve_cones
 from mbsim.dynamics.stiction.cones import FORCE as HELD_BY
 from mbsim.geometry.catalog import AT_NORMAL
 from mbsim.laws.friction.stiction import MU_STATIC
@@ -149,20 +151,59 @@ def spread(scene: Scene, t: float, y: F1, most: float) -> None:
 
 
 @jitable
-def share_sticking(scene: Scene, t: float, y: F1) -> None:
-    """Fill what holds each slot that sticks at the point evaluated last, and what it shows."""
+def sticking_part(scene: Scene) -> float:
+    """Return the largest force that holds a slot over what holds at most: above 1 some must slip.
+
+    What presses next to nothing has no limit of its own.
+    """
+    slot, part, most = scene.equations.slot, 0.0, most_capacity(scene)
+    for e in range(first_of_slots(scene), len(slot), 2):
+        if not sticks(scene, e):
+            continue
+        along = scene.work.sticking_force[slot[e]]
+        able = max(capacity(scene, slot[e]), least_capacity(scene, slot[e], most))
+        force = math.hypot(along[0], along[1])
+        if able > 0.0:
+            part = max(part, force / able)
+        elif force > 0.0:
+            return math.inf
+    return part
+
+
+@jitable
+def take_multipliers(scene: Scene) -> int:
+    """Fill what holds each slot by the equations in use alone; return how many others stick."""
     force, active, first = scene.work.sticking_force, scene.equations.active, first_of_slots(scene)
     slot, count = scene.equations.slot, 0
     for e in range(first, len(slot), 2):
         force[slot[e], 0] = force[slot[e], 1] = 0.0
         count += 2 if sticks(scene, e) else 0
     if count == 0:
-        return
+        return 0
     for r in range(active_count(scene)):
         if active[r] >= first:
             force[slot[active[r]], (active[r] - first) % 2] = scene.sweep.multiplier[r]
             count -= 1
-    most = most_capacity(scene)
+    return count
+
+
+@jitable
+def part_at_most_of(scene: Scene, t: float, y: F1) -> float:
+    """Return what `sticking_part` is at most, at less cost; what holds each slot is lost."""
+    sweep, count, most = scene.sweep, take_multipliers(scene), most_capacity(scene)
+    if count == 0 or most == 0.0:
+        return sticking_part(scene)
+    count, r = fill_cones(scene, t, y, most)
+    if not is_loaded(scene, r):
+        return sticking_part(scene)
+    return part_at_most(sweep.share, count, r, sweep.cone, sweep.mix)
+
+
+@jitable
+def share_sticking(scene: Scene, t: float, y: F1) -> None:
+    """Fill what holds each slot that sticks at the point evaluated last, and what it shows."""
+    first, slot = first_of_slots(scene), scene.equations.slot
+    count, most = take_multipliers(scene), most_capacity(scene)
     if count > 0 and most > 0.0:
         spread(scene, t, y, most)
     for e in range(first, len(slot), 2):
