@@ -70,3 +70,25 @@ def test_a_load_that_is_passed_moves_what_it_can_and_no_more():
     assert moves.tolist() == [False, True]
     np.testing.assert_allclose(motion, [0.0, 0.5, 0.5], atol=1e-7)
     np.testing.assert_allclose(forces[1], [0.0, 1.0], atol=1e-7)
+
+
+@pytest.mark.parametrize("count", range(2, 9))
+@pytest.mark.parametrize(("spread", "above"), [(0.0, 1.6), (2.0, 30.0)])
+def test_the_bound_of_a_load_is_never_below_it_nor_far_above(count, spread, above):
+    rng = np.random.default_rng(count)
+    for _ in range(10):
+        S, limits = points(rng, count), 10.0 ** rng.uniform(-spread, 0.0, count)
+        load = rng.normal(size=3)
+        V, K = np.zeros((9, max(2 * count, 3))), np.zeros((3, 3))
+        V[cones.CAPACITY, :count], V[cones.LOAD, :3] = limits, load
+        bound = cones.part_at_most(S, 2 * count, 3, V, K)
+        part = least_part(S, limits, load)
+        assert part * (1.0 - 1e-7) <= bound < above * part
+
+
+def test_a_load_that_nothing_holds_has_no_bound():
+    S, load = np.zeros((4, 3)), np.array([0.0, 1.0, 1.0])
+    S[0, 0] = S[1, 1] = S[2, 0] = S[3, 1] = 1.0
+    V, K = np.zeros((9, 4)), np.zeros((3, 3))
+    V[cones.CAPACITY, :2], V[cones.LOAD, :3] = 1.0, load
+    assert cones.part_at_most(S, 4, 3, V, K) > 1e3

@@ -66,6 +66,10 @@ CASES = [
     # a corner lifts while it sticks
     ("RADAU5", 1e-6, (3, 0.1, 1.0, 0.298), (22047200.0, 1.1, 499.024, 0.911), 0.01, 600),
     ("AUTO", 1e-5, (3, 0.2, 1.0, 0.2), (1e5, 1.0, 100.0, 0.5), 0.5, 250),
+    # edges next to parallel crossed with a normal across the faces, and the box was held along that
+    ("AUTO", 1e-3, (4, 0.1, 0.5, 0.232), (141300.0, 1.3, 4.619, 0.315), 0.09, 250),
+    # the row of another corner became a corner, and that was held at the middle of the box
+    ("AUTO", 1e-3, (5, 0.1, 0.5, 0.261), (243100.0, 1.5, 3.635, 0.769), 0.14, 350),
 ]
 
 

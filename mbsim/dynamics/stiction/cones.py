@@ -174,7 +174,7 @@ def part_at_most(S: F2, count: int, r: int, V: F2, K: F2) -> float:
     held /= square
     for a in range(r):
         left = max(left, abs(V[GRADIENT, a] - held * m[a]))
-    if left > HELD * held * math.sqrt(square):
+    if not (held > 0.0 and left <= HELD * held * math.sqrt(square)):
         return math.inf
     for k in range(0, count, 2):
         part = max(part, math.hypot(u[k], u[k + 1]) / held)
