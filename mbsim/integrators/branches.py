@@ -67,9 +67,8 @@ FARTHER = 10.0
 JUST_BEHIND = 1e-6
 #: How much the load of what friction holds may bend within a step, over its limit and sqrt(tol).
 BENT = 2.0
-#: At so many parts of a step the load is looked at; and how many times as far from the limit as it
-#: bends it has to stay to bend as it likes.
-LOADS, FAR = 4, 2.0
+#: How many times as far from the limit as it bends it has to stay to bend as it likes.
+FAR = 2.0
 
 
 @jitable
@@ -145,17 +144,23 @@ def loads_of(p: Problem, m: Method, t: float, h: float, what: float) -> tuple[fl
     That is the first part of the step at which the load is above 1, and 1 for none. The problem is
     left evaluated at the trial point.
     """
-    begin, end = load_of(p, m, t, m.y, what), load_of(p, m, t + h, m.trial, what)
-    most, bent, passed = max(begin, end), 0.0, 1.0
-    for k in range(LOADS - 1, 0, -1):
-        s = k / LOADS
-        interpolate(m, s, m.error)
-        load = load_of(p, m, t + s * h, m.error, what)
-        most, bent = max(most, load), max(bent, abs(load - (1.0 - s) * begin - s * end))
-        if load > 1.0:
-            passed = s
-    load_of(p, m, t + h, m.trial, LOAD_AT_MOST)
-    return most, bent, passed
+    begin = load_of(p, m, t, m.y, what)
+    interpolate(m, 0.25, m.error)
+    first = load_of(p, m, t + 0.25 * h, m.error, what)
+    interpolate(m, 0.5, m.error)
+    middle = load_of(p, m, t + 0.5 * h, m.error, what)
+    interpolate(m, 0.75, m.error)
+    last = load_of(p, m, t + 0.75 * h, m.error, what)
+    end = load_of(p, m, t + h, m.trial, what)
+    bent = max(
+        abs(first - 0.75 * begin - 0.25 * end),
+        abs(middle - 0.5 * begin - 0.5 * end),
+        abs(last - 0.25 * begin - 0.75 * end),
+    )
+    passed = 0.75 if last > 1.0 else 1.0
+    passed = 0.5 if middle > 1.0 else passed
+    passed = 0.25 if first > 1.0 else passed
+    return max(begin, first, middle, last, end), bent, passed
 
 
 @jitable
