@@ -19,3 +19,11 @@ def test_it_does_not_jitter_and_is_held(depth, friction, tmp_path):
     if friction == "STICTION":
         x = run["bodies/2/position"][late]
         assert np.ptp(x, axis=0).max() < 1e-8
+
+
+@pytest.mark.parametrize(("method", "tol"), [("DOPRI5", 1e-3), ("DOPRI5", 1e-5), ("DOP853", 1e-5)])
+def test_explicit_methods_do_not_shake_it(method, tol, tmp_path):
+    """Steps beyond the bound of stability shook it at 0.3 tol for a second and more."""
+    run = run_deck(tmp_path, slope("LARGEST", "STICTION"), 1.0, 0.005, integrator=method, tol=tol)
+    late = run["time"] > 0.6
+    assert abs(run["bodies/2/angular_velocity"][late]).max() < 1e-6

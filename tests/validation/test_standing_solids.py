@@ -9,6 +9,7 @@ from scipy.special import ellipe, ellipk
 
 import mbsim
 from helpers import random_decks
+from helpers.decks import GRAVITY, GROUND, run_deck
 from helpers.invariances import CHANGES
 from helpers.standing import apart, poses_of
 
@@ -113,3 +114,32 @@ def test_friction_is_that_of_a_ring_that_slips_and_spins(tmp_path, ratio):
     assert x / z == pytest.approx(-0.25 * along, abs=0.25 * 0.035)
     assert y / z == pytest.approx(0.0, abs=1e-6)
     assert 0.005 * slowed / 0.02 == pytest.approx(0.25 * 0.98 * about, abs=0.25 * 0.98 * 0.035)
+
+
+@pytest.mark.parametrize("law", ["COULOMB_ON", "STICTION", "LUGRE"])
+def test_the_tip_of_a_cone_rubs_as_a_rim_of_next_to_no_radius(law, tmp_path):
+    """Where its three points fell on one place to the last digit there was no friction, or NaN.
+
+    Steps shrank with tol, or the run ended: what rubbed and what did not took turns by rounding.
+    """
+    seen = []
+    for top in (0.0, 1e-7):
+        model = (
+            GROUND
+            + GRAVITY
+            + f"""<Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="0.002" inertia_yy="0.003"
+            inertia_zz="0.001" v_ic_x="0.5" v_ic_x_flag="TRUE" v_ic_z="-1" v_ic_z_flag="TRUE"
+            w_ic_y="2" w_ic_y_flag="TRUE"/><Reference_Marker id="20" body_id="2" pos_z="0.11"/>
+            <Reference_Marker id="21" body_id="2" pos_z="0.2" theta="2.9"/>
+            <Post_Graphic id="200" type="Frustum" center_marker_id="21" bottom_radius="0.07"
+            top_radius="{top!r}" length="0.2"/>
+            <Force_Contact id="301" i_graphics_id="200" j_graphics_id="100" cnf_type="IMPACT"
+            stiffness="1e5" exponent="1.5" cff_type="{law}" {LAWS[law]}/>"""
+        )
+        run = run_deck(tmp_path, model, 0.06, 0.002, integrator="DOPRI5", tol=1e-7)
+        moves = (run[f"bodies/2/{name}"][-1] for name in ("velocity", "angular_velocity"))
+        seen.append((run.stats["steps"], *moves))
+    (steps, *tip), (most, *rim) = seen
+    assert steps < 1.3 * most
+    for here, there in zip(tip, rim, strict=True):
+        np.testing.assert_allclose(here, there, rtol=0.0, atol=1e-5)

@@ -182,7 +182,9 @@ def ask_over_rim(scene: Scene, s: int, c: int) -> int:
     ux, uy = slip_x + spin * py, slip_y - spin * px
     speed = math.hypot(ux, uy)
     ex, ey = (ux / speed, uy / speed) if speed > 0.0 else (1.0, 0.0)
-    uneven, share, code = 2.0 * min(off, 0.5) / r, part / AROUND, 0
+    # the tip of a cone is a rim of no radius
+    uneven = 2.0 * min(off, 0.5) / r if r > 0.0 else 0.0
+    share, code = part / AROUND, 0
     call = (contacts.id[c], given, contacts.friction_par[c], out)
     scene.log.counters[FRICTION_CALLS] += AROUND - 1
     for k in range(AROUND):
@@ -276,7 +278,7 @@ def ask_at_place(scene: Scene, s: int, c: int) -> int:
             # from the point to the place
             qx, qy = part * (r * a - px), part * (r * b - py)
             # of the mean of the three, what the pressure has at the place and at the point
-            there = 1.0 + 2.0 * min(off, 0.5) * (a * lx + b * ly) / r
+            there = 1.0 + (2.0 * min(off, 0.5) * (a * lx + b * ly) / r if r > 0.0 else 0.0)
             here = 1.0 + 2.0 * off if s == first else 1.0 - off
             times = part * there / here + 1.0 - part
     given[XDOT_IN], given[XDOT_IN + 1] = slip_x - spin * qy, slip_y + spin * qx
