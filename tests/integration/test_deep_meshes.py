@@ -68,7 +68,7 @@ def test_what_sinks_through_the_layer_is_told_when_it_does(method, tmp_path):
     assert run.stats["too_deep"] > 0
 
 
-@pytest.mark.parametrize("law", [LARGEST, FIELD])
+@pytest.mark.parametrize("law", [LARGEST, pytest.param(FIELD, marks=pytest.mark.slow)])
 def test_what_lies_on_a_mesh_or_apart_in_its_box_is_not_told(law, tmp_path):
     slab = trimesh.creation.annulus(0.01, 0.3, 0.1, sections=32)
     run = run_deck(tmp_path, scene(RING, slab, law, z=0.0599999), 0.05)

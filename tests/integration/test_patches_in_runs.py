@@ -68,11 +68,22 @@ EXPLICIT = [name for name in FRICTIONS if name != "INFINITE"]
 EVERY = [
     *((depth, friction, "DOPRI5") for depth in DEPTHS for friction in EXPLICIT),
     # with a user's own memory the peaks of an L that rocks take 26,000 steps of RADAU5
-    *(("LARGEST", friction, "RADAU5") for friction in EXPLICIT if friction != "CFFSUB"),
+    *(
+        pytest.param(
+            "LARGEST", friction, "RADAU5", marks=[pytest.mark.slow] * (friction != "LUGRE")
+        )
+        for friction in EXPLICIT
+        if friction != "CFFSUB"
+    ),
     # the L rocks from peak to peak: 70 s
     pytest.param("LARGEST", "INFINITE", "RADAU5", marks=pytest.mark.slow),
     ("FIELD", "CFFSUB", "RADAU5"),
-    *(("FIELD", friction, "GALPHA") for friction in FRICTIONS),
+    *(
+        pytest.param(
+            "FIELD", friction, "GALPHA", marks=[pytest.mark.slow] * (friction != "INFINITE")
+        )
+        for friction in FRICTIONS
+    ),
     ("VOLUME", "INFINITE", "RADAU5"),
 ]
 
@@ -112,6 +123,7 @@ AGREE = [
         in (
             *(("LARGEST", "CFFSUB"), ("LARGEST", "STICTION")),
             *(("VOLUME", "INFINITE"), ("FIELD", "INFINITE")),
+            *(("FIELD", "STICTION"), ("LARGEST", "LUGRE")),
         )
         else [],
     )

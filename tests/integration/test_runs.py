@@ -49,7 +49,11 @@ def slow_deck(folder):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="sends signals")
 @pytest.mark.parametrize(
-    ("method", "sent"), [("DOPRI5", "SIGINT"), ("DOP853", "SIGTERM"), ("DOP853", "SIGHUP")]
+    ("method", "sent"),
+    [
+        ("DOPRI5", "SIGINT"),
+        *(pytest.param("DOP853", s, marks=pytest.mark.slow) for s in ("SIGTERM", "SIGHUP")),
+    ],
 )
 def test_a_signal_keeps_everything_and_resume_gives_the_same_run(tmp_path, method, sent):
     if sent == "SIGHUP" and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:

@@ -213,7 +213,7 @@ def test_a_patch_creeps_as_its_law_says(tmp_path):
     assert np.ptp(x[late]) / np.ptp(t[late]) == pytest.approx(0.01 * u, rel=2e-3)
 
 
-@pytest.mark.parametrize("tol", [1e-3, 1e-5])
+@pytest.mark.parametrize("tol", [1e-3, pytest.param(1e-5, marks=pytest.mark.slow)])
 def test_a_heap_comes_to_rest(tmp_path, tol):
     # 64 balls dropped into a pit that is a little too wide for 4 x 4
     places = block(4, 0.205, z=0.11, jitter=0.002, seed=1) + np.array([0.11, 0.11, 0.0])
