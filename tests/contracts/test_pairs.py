@@ -12,6 +12,7 @@ from helpers.pairs import (
     SLAB,
     UPRIGHT,
     candidates,
+    entry,
     frame,
     random_rotation,
     turned,
@@ -373,3 +374,50 @@ def test_box_over_the_middle_of_a_face_is_a_box_on_a_plane():
     )
     assert count == len(points)
     np.testing.assert_allclose(points[points[:, 0] > 0][:, 4:7], [[0, 0, -1]] * 4)
+
+
+#: Shapes that stand: size, half height, and how far out their lowest point is when they are tilted
+#: towards (0.8, 0.6); and large ones below them, which end at z = 0: size, half height.
+STANDING = {
+    "CYLINDER": (np.array([0.25, 0.4, 0.0]), 0.4, 0.25),
+    "FRUSTUM": (np.array([0.3, 0.15, 0.35]), 0.35, 0.3),
+    "BOX": (np.array([0.4, 0.3, 0.2]), 0.2, 0.5),
+}
+BELOW = {
+    "CYLINDER": (np.array([3.0, 0.4, 0.0]), 0.4),
+    "FRUSTUM": (np.array([4.0, 3.0, 0.4]), 0.4),
+    "BOX": (np.array([3.0, 2.5, 0.4]), 0.4),
+}
+
+
+@pytest.mark.parametrize("tilt", [1e-7, 1e-5, 1e-3, 1e-2])
+@pytest.mark.parametrize(
+    ("name", "top"),
+    [
+        *(("CYLINDER-BOX", top) for top in ("CYLINDER", "BOX")),
+        *(("FRUSTUM-BOX", top) for top in ("FRUSTUM", "BOX")),
+        *(("FRUSTUM-CYLINDER", top) for top in ("FRUSTUM", "CYLINDER")),
+        ("CYLINDER-CYLINDER", "CYLINDER"),
+        ("FRUSTUM-FRUSTUM", "FRUSTUM"),
+    ],
+)
+def test_what_is_tilted_presses_at_its_lowest_point(name, top, tilt):
+    """However little it is tilted, where it is tilted by more than it is deep."""
+    shapes = name.split("-")
+    below = shapes[1] if shapes[0] == top else shapes[0]
+    (size, half, far), (under, high) = STANDING[top], BELOW[below]
+    low = turned((-0.6, 0.8, 0.0), tilt) @ [0.8 * far, 0.6 * far, -half]
+    depth = 0.1 * far * tilt
+    centre = np.array([0.3, 0.2, -depth - low[2]])
+    sides = [
+        (frame(centre, turned((-0.6, 0.8, 0.0), tilt)), size),
+        (frame([0.0, 0.0, -high], UPRIGHT), under),
+    ]
+    if shapes[0] != top:
+        sides.reverse()
+    points = np.full((PAIRS[name].slots, POINT), np.nan)
+    entry(name)(*(a.ctypes.data for a in (*sides[0], *sides[1], points)))
+    force = wrench(points)
+    assert abs(force[2]) == pytest.approx(depth, rel=1e-3)
+    place = np.array([-force[4], force[3]]) / force[2]
+    assert place == pytest.approx(centre[:2] + low[:2], abs=1e-3 * far)

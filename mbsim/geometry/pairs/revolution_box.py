@@ -38,11 +38,20 @@ from mbsim.geometry.manifold import (
 )
 from mbsim.geometry.pairs.revolution import cylinder_size
 from mbsim.geometry.region import cylinder_on_rectangle, disc_on_rectangle
-from mbsim.geometry.rotor import end_disc, end_facing, pointed, side_distance, side_line, widest
+from mbsim.geometry.rotor import (
+    end_disc,
+    end_facing,
+    off_normals,
+    side_distance,
+    side_line,
+    widest,
+)
 
 #: Rows: of an end disc 6 for the rim, then 2 for each edge of the face (where it enters the disc,
 #: or its corner; where it leaves); of a line its bottom and top end and a crossing; one point.
 BOX_ROWS = ARC_ROWS + 9
+#: Farther from where all of an edge, an end or a side is farthest one point is.
+SINGLE = 1e-8
 
 
 @jitable
@@ -381,7 +390,9 @@ def solid_on_box(i: Shape, j: Shape, points: F2) -> int:
 def middle_of_one(i: Shape, j: Shape, axes: tuple[int, int, int], n: V3, f: float) -> V3:
     """Return the place of one point: at a rim, a corner, or where side and edge cross."""
     low, high = far(i, scale(-1.0, n)), far(j, n)
-    if pointed(i, scale(-1.0, n)) > 1e-6:
+    # a box has one farthest point where n is along no face and across no edge
+    corner = min(abs(dot(j[2], n)), min(abs(dot(j[3], n)), abs(dot(j[4], n))))
+    if off_normals(i, scale(-1.0, n)) > max(corner, SINGLE):
         return add(low, scale(0.5 * f, n))
     e = edge_axis(j, axes[2])
     if abs(dot(e, n)) < 1e-6 and end_facing(i, scale(-1.0, n)) == 0:
