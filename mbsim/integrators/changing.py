@@ -148,6 +148,9 @@ def note_pace(m: Method, t: float) -> None:
 def count_stiff(m: Method, h: float) -> None:
     """Count a step of length h that was at the bound of stability, or one that was not."""
     if m.memory[STIFFNESS] > BOUND:
+        if m.memory[STIFF_STEPS] == 0.0:
+            # nothing is known of it: as long as the error allows
+            m.memory[PART] = 1.0
         # a hidden rate is far beyond the bound: what else it bounds trembles soon
         m.memory[STIFF_STEPS] += 2.0 if m.memory[STIFFNESS] == math.inf else 1.0
         if m.memory[WAS_CUT] == 0.0:

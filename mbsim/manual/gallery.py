@@ -92,6 +92,6 @@ def _shoot(photograph: Photograph, results: Results, folder: Path, target: Path)
     file = folder / "page.html"
     file.write_text(report(results) if photograph.page == "report" else text, encoding="utf-8")
     with opened_page(*WINDOW) as window:
-        window.open(file.as_uri())
+        window.open(file.as_uri() + "#picture")
         window.run(f"mbsimReady.then(() => {{ mbsimView.setTime({at!r}); mbsimView.draw(); }})")
         target.write_bytes(window.picture())

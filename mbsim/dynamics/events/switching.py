@@ -62,6 +62,7 @@ from mbsim.dynamics.contact.forces import (
 from mbsim.dynamics.contact.memory import slipping_mass
 from mbsim.dynamics.expressions.jets import value
 from mbsim.dynamics.forces.applied import side_of
+from mbsim.dynamics.stiction.faces import holds_nothing
 from mbsim.dynamics.stiction.rigid_friction import holding_force, side_of_rigid
 from mbsim.geometry.catalog import AT_POINT
 from mbsim.laws.catalog import BRANCHES, STICK, UNDECIDED
@@ -103,18 +104,21 @@ def some_left(scene: Scene) -> bool:
     """Return whether an incident with modes of the committed state is none at the point evaluated.
 
     One that was no deeper than rounding of its place has not left, and one that pressed less than
-    the tolerance of what presses most leaves nothing.
+    the tolerance of what presses most, of its group of bodies, leaves nothing.
     """
-    state, work, most = scene.state, scene.work, 0.0
-    for k in range(state.hit[len(state.hit) - 1]):
-        most = max(most, state.normal[state.hit[k]])
-    for k in range(state.hit[len(state.hit) - 1]):
-        s = state.hit[k]
-        if state.normal[s] < scene.world.scale[TOLERANCE] * most:
+    state, work, group = scene.state, scene.work, scene.scales.of_contact
+    count = state.hit[len(state.hit) - 1]
+    for k in range(count):
+        s, most = state.hit[k], 0.0
+        if work.touching[s] == 1 or not state.mode[s] % BRANCHES > 0.0:
             continue
-        if work.touching[s] == 0 and state.mode[s] % BRANCHES > 0.0:
-            if work.slot[s, DEPTH] > RESOLVED * norm(vector(work.points[s, AT_POINT:])):
-                return True
+        if work.slot[s, DEPTH] <= RESOLVED * norm(vector(work.points[s, AT_POINT:])):
+            continue
+        for other in range(count):
+            if group[contact_of(scene, state.hit[other])] == group[contact_of(scene, s)]:
+                most = max(most, state.normal[state.hit[other]])
+        if state.normal[s] >= scene.world.scale[TOLERANCE] * most:
+            return True
     return False
 
 
@@ -356,7 +360,7 @@ def may_turn(scene: Scene, s: int, h: float) -> bool:
     So it is where friction alone could have stopped it.
     """
     kept, row = scene.state.memory[s], scene.work.slot[s]
-    if kept[KEPT_MODE] != SLIPS or scene.work.touching[s] == 0:
+    if kept[KEPT_MODE] != SLIPS or scene.work.touching[s] == 0 or holds_nothing(scene, s):
         return False
     most = scene.contacts.friction_par[contact_of(scene, s), MU_STATIC] * row[NORMAL]
     return slipping_mass(scene, s) * min(kept[KEPT_SPEED], row[SLIP]) <= h * most

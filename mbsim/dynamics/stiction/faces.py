@@ -52,6 +52,9 @@ def face_of(scene: Scene, pair: int, points: F2, at: int) -> tuple[V3, float]:
     if scene.kinds.moves[scene.pairs.kind[pair]] == ON_PLANE:
         return axis(frame, 2), 0.0
     n, best = common_normal(scene, pair, points, at), 0
+    if norm(n) == 0.0:
+        # apart, as at a trial point: all rows have the direction of the gap
+        n = vector(points[at, AT_NORMAL:])
     if scene.kinds.swapped[scene.pairs.kind[pair]] == 1:
         n = scale(-1.0, n)
     for k in range(1, 3):
