@@ -460,6 +460,8 @@ def open_results(path: str | Path) -> Results:
         opened = opened_file(file)
     except OSError as error:
         reason = getattr(error, "strerror", None) or "not an HDF5 file, or a damaged one"
+        if file.suffix.lower() in (".xml", ".adm"):
+            reason = f"a deck; its result file is {file.stem}/{file.stem}.h5 after mbsim run {file}"
         raise ResultsError(f"{file}: cannot be read: {reason}") from None
     try:
         ours = "mbsim_version" in opened.attrs

@@ -190,6 +190,20 @@ def test_a_signal_is_found_added_and_followed(page, file):
     assert size == pytest.approx(np.hypot(wanted, 9.81 * 0.1), rel=0.5)
 
 
+def test_what_is_round_is_shown_round(page):
+    # pixels that a slope takes, across over up: with the panel, without it, and in a picture
+    ratio = """(() => { const stage = mbsimView.stage, canvas = mbsimView.canvas;
+      const p = stage.camera.projectionMatrix.elements;
+      return p[0] * canvas.clientWidth / (p[5] * canvas.clientHeight); })()"""
+    found = [page.run(ratio)]
+    for _ in range(2):
+        page.run("mbsimView.panel()")
+        found.append(page.run(ratio))
+    page.run("mbsimView.still(0.0).length")
+    found.append(page.run(ratio))
+    assert found == pytest.approx([1.0] * 4, rel=1e-6)
+
+
 def test_a_picture_looks_as_it_did(text, tmp_path):
     """Made by `mbsim view balls.h5 --png tests/view/balls.png --time 0.3 --size 320x200`."""
     from PIL import Image

@@ -390,7 +390,11 @@ mbsim.View = (function () {
       const width = this.root.clientWidth, height = this.root.clientHeight;
       const free = width > 760 && !this.root.classList.contains("folded") && !this.root.classList.contains("still");
       this.stage.free = (free ? width - 332 : width) / height;
-      if (free) { this.stage.camera.setViewOffset(width + 332, height, 332, 0, width, height); } else { this.stage.camera.clearViewOffset(); }
+      if (free) { this.stage.camera.setViewOffset(width + 332, height, 332, 0, width, height); } else {
+        // an offset has set the aspect to that of its whole, and keeps it
+        this.stage.camera.aspect = width / height;
+        this.stage.camera.clearViewOffset();
+      }
       this.changed = true;
     }
 
