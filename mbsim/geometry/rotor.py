@@ -60,16 +60,9 @@ def side_distance(shape: Shape, p: V3) -> tuple[float, V3]:
 
 @jitable
 def pointed(shape: Shape, d: V3) -> float:
-    """Return how far d is from the normals of ends and side, where no single point is farthest."""
-    c = dot(shape[4], d)
-    return min(abs(c - slant(shape[5])), 1.0 - abs(c))
+    """Return how far d is from the normals of ends and side, where no single point is farthest.
 
-
-@jitable
-def off_normals(shape: Shape, d: V3) -> float:
-    """Return by what angle, or its sine, d is off the normals of ends and side: as `pointed`.
-
-    Of the ends it is the sine, and not 1 less the cosine, which is 5e-7 for a thousandth.
+    From the ends it is the sine, and not 1 less the cosine, which is 5e-7 for a thousandth.
     """
     return min(abs(dot(shape[4], d) - slant(shape[5])), norm(cross(shape[4], d)))
 

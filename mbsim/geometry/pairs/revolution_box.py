@@ -41,7 +41,7 @@ from mbsim.geometry.region import cylinder_on_rectangle, disc_on_rectangle
 from mbsim.geometry.rotor import (
     end_disc,
     end_facing,
-    off_normals,
+    pointed,
     side_distance,
     side_line,
     widest,
@@ -392,7 +392,7 @@ def middle_of_one(i: Shape, j: Shape, axes: tuple[int, int, int], n: V3, f: floa
     low, high = far(i, scale(-1.0, n)), far(j, n)
     # a box has one farthest point where n is along no face and across no edge
     corner = min(abs(dot(j[2], n)), min(abs(dot(j[3], n)), abs(dot(j[4], n))))
-    if off_normals(i, scale(-1.0, n)) > max(corner, SINGLE):
+    if pointed(i, scale(-1.0, n)) > max(corner, SINGLE):
         return add(low, scale(0.5 * f, n))
     e = edge_axis(j, axes[2])
     if abs(dot(e, n)) < 1e-6 and end_facing(i, scale(-1.0, n)) == 0:

@@ -36,18 +36,12 @@ from mbsim.geometry.manifold import (
     turn_of,
 )
 from mbsim.geometry.pairs.revolution import cylinder_size
-from mbsim.geometry.rotor import (
-    end_disc,
-    end_facing,
-    off_normals,
-    pointed,
-    side_distance,
-    side_line,
-    widest,
-)
+from mbsim.geometry.rotor import end_disc, end_facing, pointed, side_distance, side_line, widest
 
 #: Rows: 6 for each rim, 2 where the rims cross; of a line its two ends and a crossing; one point.
 PAIR_ROWS = 2 * ARC_ROWS + 3
+#: Nearer to where all of an end or a side is farthest all directions are searched.
+LONE = 4.5e-5
 
 
 @jitable
@@ -87,7 +81,7 @@ def rim_over_side(other: Shape, shape: Shape, d: V3, p: V3, margin: float) -> bo
     on_side = abs(dot(d, shape[4]) - slant(shape[5])) < 1e-12
     z = dot(sub(p, shape[1]), shape[4])
     # a single point has to lie there: a rim's, not one of a line's
-    return on_side and abs(z) < shape[5][2] - margin and pointed(other, scale(-1.0, d)) > 1e-9
+    return on_side and abs(z) < shape[5][2] - margin and pointed(other, scale(-1.0, d)) > LONE
 
 
 @jitable
@@ -336,7 +330,7 @@ def solid_on_solid(i: Shape, j: Shape, points: F2) -> int:
     else:
         part = side_by_side(i, j, n, f, points)
     # a rim has one farthest point, an end or a side many
-    rim_i = off_normals(i, scale(-1.0, n)) > off_normals(j, n)
+    rim_i = pointed(i, scale(-1.0, n)) > pointed(j, n)
     low, high = far(i, scale(-1.0, n)), far(j, n)
     p = add(low, scale(0.5 * f, n)) if rim_i else sub(high, scale(0.5 * f, n))
     share_with_one(points, PAIR_ROWS - 1, part, end_i == 0 and end_j == 0, f, p, n)
