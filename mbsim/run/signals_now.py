@@ -184,7 +184,7 @@ class SignalsNow(Mapping[str, Any]):
     def _of_expressions(self, request: Any) -> Get:
         """Return what gives F1 to F8 of an EXPRESSION, as `results.requests` has them of rows.
 
-        A controller reads them at every step: plain numbers take a tenth of the time of arrays.
+        A controller reads them at every step: plain numbers are read sooner than arrays.
         """
         rows, evaluate = self._rows, self._evaluate
         given = places(request, self._system.values)

@@ -86,7 +86,7 @@ mbsim.Stage = (function () {
     return [0, 1, 2].map((k) => Math.cos(angle) * x[k] + Math.sin(angle) * y[k]);
   }
 
-  // Whether a processor draws: smooth edges of many triangles take it three times as long.
+  // Whether a processor draws: smooth edges of many triangles take it longer than all else.
   function drawnByProcessor() {
     const gl = document.createElement("canvas").getContext("webgl2");
     if (!gl) { return false; }
