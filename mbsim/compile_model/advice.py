@@ -16,8 +16,9 @@ from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS, FrictionInput, Normal
 from mbsim.laws.constants import friction_parameters, normal_constants
 from mbsim.laws.impact_test import impact_of, resting_depth
 from mbsim.model.contact_radius import with_radii
-from mbsim.model.elements import Array, Contact, Graphic, Model
+from mbsim.model.elements import Array, Contact, Graphic, Model, Units
 from mbsim.model.placement import BodyPlace, MarkerPlace, Placement, graphic_box, place
+from mbsim.reader.units import symbol
 
 #: A depth is worth a word beyond this part of the smaller shape's least width.
 DEEP = 0.01
@@ -48,7 +49,7 @@ class _Meeting(NamedTuple):
 
 
 def advice(model: Model) -> Iterator[tuple[str, str]]:
-    """Yield contacts and what their settings mean, in the deck's units."""
+    """Yield contacts and what their settings mean, in the deck's units, which are named."""
     if not model.contacts:
         return
     scene = _Weights(model)
@@ -61,8 +62,8 @@ def advice(model: Model) -> Iterator[tuple[str, str]]:
         meetings = list(scene.meetings(contact))
         for text in (
             *_at_rest(contact, law, constants, meetings, model),
-            *_impacts(law, constants, meetings, model.units.mass_scale),
-            *_creep(contact, meetings),
+            *_impacts(law, constants, meetings, model.units),
+            *_creep(contact, meetings, model.units),
         ):
             yield name, text
 
@@ -80,19 +81,21 @@ def _at_rest(
         return
     size = heavy.width if math.isfinite(heavy.width) else 1e3
     depth = resting_depth(law, constants, heavy.load, 1e3 * size)
-    text = f"at rest under {heavy.load:.4g} of weight it is {depth:.3g} deep"
+    force, length = symbol(model.units.force), symbol(model.units.length)
+    text = f"at rest under {heavy.load:.4g} {force} of weight it is {depth:.3g} {length} deep"
     if heavy.points > 1:
         spread = resting_depth(law, constants, heavy.load / heavy.points, 1e3 * size)
-        text += f" on one point, {spread:.3g} on {heavy.points}"
+        text += f" on one point, {spread:.3g} {length} on {heavy.points}"
         depth = spread
     if depth > DEEP * heavy.width:
-        text += f": more than {DEEP:.0%} of a width of {heavy.width:.3g}; raise its stiffness"
+        wide = f"{heavy.width:.3g} {length}"
+        text += f": more than {DEEP:.0%} of a width of {wide}; raise its stiffness"
     yield text
     if contact.cnf_type == "IMPACT" and contact.dmax is not None and contact.damping > 0.0:
         if depth < SHALLOW * contact.dmax:
             yield (
                 f"its damper hardly acts at rest, where it is less than {SHALLOW:.0%} of dmax "
-                f"deep; lower dmax to {depth:.2g}"
+                f"deep; lower dmax to {depth:.2g} {length}"
             )
     if math.isfinite(depth) and heavy.mass > 0.0:
         yield from _step(law, constants, heavy, depth, model)
@@ -112,29 +115,33 @@ def _step(
     span = sum(each.end_time - each.start_time for each in model.simulations)
     if fastest > 0.0 and span * fastest / STABLE > MANY_STEPS:
         yield (
-            f"costly by explicit methods: stable steps at rest are {STABLE / fastest:.2g} long, "
-            f"{span * fastest / STABLE:.2g} of them; AUTO, GALPHA and RADAU5 take longer ones"
+            f"costly by explicit methods: stable steps at rest are {STABLE / fastest:.2g} "
+            f"{symbol(model.units.time)} long, {span * fastest / STABLE:.2g} of them; "
+            "AUTO, GALPHA and RADAU5 take longer ones"
         )
 
 
 def _impacts(
-    law: NormalLaw, constants: tuple[float, ...], meetings: list[_Meeting], mass_scale: float
+    law: NormalLaw, constants: tuple[float, ...], meetings: list[_Meeting], units: Units
 ) -> Iterator[str]:
     """Yield what the fastest first touch does; masses are said in the deck's unit."""
     fast = max(meetings, key=lambda each: each.speed, default=_Meeting())
     if fast.speed <= 0.0 or fast.mass <= 0.0:
         return
     hit = impact_of(law, constants, fast.speed, fast.mass)
+    length, time = symbol(units.length), symbol(units.time)
     text = (
-        f"it is met at {fast.speed:.3g} by a mass of {fast.mass / mass_scale:.3g}: "
-        f"{hit.depth:.3g} deep, {hit.time:.3g} long, rebound {hit.rebound:.3g} of the speed"
+        f"it is met at {fast.speed:.3g} {length}/{time} by a mass of "
+        f"{fast.mass / units.mass_scale:.3g} {symbol(units.mass)}: {hit.depth:.3g} {length} deep, "
+        f"{hit.time:.3g} {time} long, rebound {hit.rebound:.3g} of the speed"
     )
     if hit.depth > DEEP * fast.width:
-        text += f"; more than {DEEP:.0%} of a width of {fast.width:.3g}: raise its stiffness"
+        wide = f"{fast.width:.3g} {length}"
+        text += f"; more than {DEEP:.0%} of a width of {wide}: raise its stiffness"
     yield text
 
 
-def _creep(contact: Contact, meetings: list[_Meeting]) -> Iterator[str]:
+def _creep(contact: Contact, meetings: list[_Meeting], units: Units) -> Iterator[str]:
     """Yield how fast smoothed friction creeps down the incline that it could hold."""
     law = FRICTION_LAWS[contact.cff_type] if contact.cff_type in FRICTION_LAWS else None
     if law is None or law.memory or law.of_area or contact.asks_user:
@@ -168,7 +175,8 @@ def _creep(contact: Contact, meetings: list[_Meeting]) -> Iterator[str]:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if mu(middle) < steep.slope else (low, middle)
     yield (
-        f'creeps at {high:.4g} down its incline of {degrees:.3g} degrees; cff_type="STICTION" holds'
+        f"creeps at {high:.4g} {symbol(units.length)}/{symbol(units.time)} down its incline of "
+        f'{degrees:.3g} degrees; cff_type="STICTION" holds'
     )
 
 

@@ -79,6 +79,57 @@ TIME = _table(
     HOUR=3600,
     DAY=86400,
 )
+#: How units are written; the others are written as their names in lower case.
+SYMBOLS = {
+    "NEWTON": "N",
+    "KNEWTON": "kN",
+    "MEGANEWTON": "MN",
+    "CENTINEWTON": "cN",
+    "MILLINEWTON": "mN",
+    "MICRONEWTON": "µN",
+    "NANONEWTON": "nN",
+    "DYNE": "dyn",
+    "KILOGRAM_FORCE": "kgf",
+    "POUND_FORCE": "lbf",
+    "KPOUND_FORCE": "klbf",
+    "OUNCE_FORCE": "ozf",
+    "POUNDAL": "pdl",
+    "METER": "m",
+    "MILLIMETER": "mm",
+    "CENTIMETER": "cm",
+    "KILOMETER": "km",
+    "MICROMETER": "µm",
+    "NANOMETER": "nm",
+    "ANGSTROM": "Å",
+    "INCH": "in",
+    "FOOT": "ft",
+    "YARD": "yd",
+    "MILE": "mi",
+    "MILS": "mil",
+    "MICROINCH": "µin",
+    "SECOND": "s",
+    "MILLISECOND": "ms",
+    "MICROSECOND": "µs",
+    "NANOSECOND": "ns",
+    "MINUTE": "min",
+    "HOUR": "h",
+    "DAY": "d",
+    "KILOGRAM": "kg",
+    "GRAM": "g",
+    "MILLIGRAM": "mg",
+    "MEGAGRAM": "Mg",
+    "TONNE": "t",
+    "MICROGRAM": "µg",
+    "NANOGRAM": "ng",
+    "POUND_MASS": "lb",
+    "OUNCE_MASS": "oz",
+    "SLUG": "slug",
+}
+
+
+def symbol(name: str) -> str:
+    """Return how a unit is written: ``N``, ``mm``, ``slinch``."""
+    return SYMBOLS.get(name, name.lower())
 
 
 def names(table: Mapping[str, Fraction]) -> dict[str, str]:

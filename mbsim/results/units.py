@@ -11,43 +11,6 @@ from typing import Any
 
 from mbsim.reader import units as u
 
-#: How names of units are written; the others are written as their names in lower case.
-SYMBOLS = {
-    "NEWTON": "N",
-    "KNEWTON": "kN",
-    "MEGANEWTON": "MN",
-    "CENTINEWTON": "cN",
-    "MILLINEWTON": "mN",
-    "MICRONEWTON": "µN",
-    "NANONEWTON": "nN",
-    "DYNE": "dyn",
-    "KILOGRAM_FORCE": "kgf",
-    "POUND_FORCE": "lbf",
-    "KPOUND_FORCE": "klbf",
-    "OUNCE_FORCE": "ozf",
-    "POUNDAL": "pdl",
-    "METER": "m",
-    "MILLIMETER": "mm",
-    "CENTIMETER": "cm",
-    "KILOMETER": "km",
-    "MICROMETER": "µm",
-    "NANOMETER": "nm",
-    "ANGSTROM": "Å",
-    "INCH": "in",
-    "FOOT": "ft",
-    "YARD": "yd",
-    "MILE": "mi",
-    "MILS": "mil",
-    "MICROINCH": "µin",
-    "SECOND": "s",
-    "MILLISECOND": "ms",
-    "MICROSECOND": "µs",
-    "NANOSECOND": "ns",
-    "MINUTE": "min",
-    "HOUR": "h",
-    "DAY": "d",
-}
-
 
 @dataclass(frozen=True)
 class Quantity:
@@ -88,13 +51,11 @@ class UnitSystem:
     @property
     def summary(self) -> str:
         """Return the units in short: ``N, m, s``."""
-        return ", ".join(SYMBOLS.get(n, n.lower()) for n in (self.force, self.length, self.time))
+        return ", ".join(u.symbol(n) for n in (self.force, self.length, self.time))
 
     def text(self, quantity: Quantity) -> str:
         """Return the unit of a quantity as it stands on an axis; empty if it has none."""
-        force, length, time = (
-            SYMBOLS.get(name, name.lower()) for name in (self.force, self.length, self.time)
-        )
+        force, length, time = (u.symbol(name) for name in (self.force, self.length, self.time))
         # torques keep their N m
         if quantity == ENERGY and (force, length) == ("N", "m"):
             return "J"
@@ -132,7 +93,7 @@ _WRITTEN: dict[str, tuple[float, tuple[int, int, int, int]]] = {
         (u.TIME, (0, 0, 1, 0)),
     )
     for name, factor in table.items()
-    for written in (SYMBOLS.get(name, name.lower()), name.lower())
+    for written in (u.symbol(name), name.lower())
 } | {
     "um": (1e-6, (0, 1, 0, 0)),
     "us": (1e-6, (0, 0, 1, 0)),

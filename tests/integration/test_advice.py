@@ -131,3 +131,27 @@ def test_steps_of_an_explicit_method_are_as_long_as_it_says():
 
 def test_joints_are_not_guessed_about():
     assert not [text for _, text in advice(mbsim.read_model(MODELS / "gear_pair.xml"))]
+
+
+@pytest.mark.parametrize(
+    ("units", "written"),
+    [
+        ("", {"9.81 N of", "m deep", "m/s by a mass of 1 kg", "s long"}),
+        ('force_unit="POUND_FORCE" mass_unit="SLUG" length_unit="FOOT"', {"lbf of", "ft/s", "slug"}),
+        ('mass_unit="TONNE" length_unit="MILLIMETER"', {"N of", "mm deep", "mm/s by", "1 t:"}),
+    ],
+)
+def test_every_number_has_its_unit(units, written):
+    model = mbsim.read_model(
+        f"""<MotionSolve><Model><Param_Unit {units}/>
+        <Body_Rigid id="1" isground="TRUE"/>
+        <Body_Rigid id="2" mass="1" cg_id="20" inertia_xx="1" inertia_yy="1" inertia_zz="1"/>
+        <Reference_Marker id="10" body_id="1"/><Reference_Marker id="20" body_id="2" pos_z="0.6"/>
+        <Post_Graphic id="100" type="Plane" rm_id="10"/>
+        <Post_Graphic id="200" type="Sphere" center_marker_id="20" radius="0.1"/>
+        <Force_Contact id="1" i_graphics_id="200" j_graphics_id="100" cnf_type="IMPACT"
+        stiffness="1e6" exponent="1.5" damping="10" dmax="1e-3"/>
+        <Force_Gravity grav_z="-9.81"/></Model></MotionSolve>"""
+    )
+    text = " ".join(line for _, line in advice(model))
+    assert {part for part in written if part not in text} == set()
