@@ -41,9 +41,9 @@ def command(
     Writes DIR/<study>.json and DIR/<study>.html: estimates with standard deviations, what the
     records do not see, and whether the model explains them. Ctrl-C keeps the best so far.
     """
+    from mbsim.cli.count_bar import CountBar
     from mbsim.cli.messages import print_json
     from mbsim.cli.options import check_workers
-    from mbsim.cli.runs_bar import RunsBar
     from mbsim.errors import Interrupted
     from mbsim.results.files import prepare_directory
     from mbsim.results.products import check_product
@@ -58,7 +58,7 @@ def command(
     prepare_directory(folder, problem.name)
     check_product(folder / f"{problem.name}.html", "page")
     shown = progress == "auto" and sys.stderr.isatty()
-    bar = RunsBar() if shown else None
+    bar = CountBar("runs") if shown else None
     try:
         pool = pool_of(problem, workers, scheduler)
         found = identify(problem, pool, (lambda runs: bar.update(runs)) if bar else None)

@@ -58,7 +58,7 @@ def command(
     fails, or warns, is a row that says so. A design that draws from distributions gives bands of
     the outputs, and Saltelli's Sobol indices, in DIR/<study>.uncertainty.json too.
     """
-    from mbsim.cli.runs_bar import RunsBar
+    from mbsim.cli.count_bar import CountBar
     from mbsim.studies.study import read_study
     from mbsim.studies.sweep import sweep
 
@@ -70,7 +70,7 @@ def command(
         _run_only(study, only, folder, as_json)
         return
     shown = progress == "auto" and sys.stderr.isatty()
-    bar = RunsBar() if shown else None
+    bar = CountBar("runs") if shown else None
     try:
         swept = sweep(
             study,

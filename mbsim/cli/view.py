@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -125,6 +126,7 @@ class _Asked:
 
     def write(self) -> None:
         """Write the files that are asked for."""
+        from mbsim.cli.count_bar import CountBar
         from mbsim.cli.messages import warn
         from mbsim.errors import ModelError
         from mbsim.results.curves import names_of
@@ -150,7 +152,13 @@ class _Asked:
             echo(f"{self.gltf}: {said_size(self.gltf)}")
         if any(pictures.values()):
             time, speed = self.rest["time"], self.rest["speed"]
-            make(text, self.size, **pictures, time=time, speed=speed)  # type: ignore[arg-type]
+            bar = CountBar("pictures") if sys.stderr.isatty() and (self.gif or self.mp4) else None
+            update = bar.update if bar else None
+            try:
+                make(text, self.size, **pictures, time=time, speed=speed, progress=update)  # type: ignore[arg-type]
+            finally:
+                if bar is not None:
+                    bar.stop()
             for file in filter(None, pictures.values()):
                 echo(f"{file}: {said_size(file)}")
         if page is not None:

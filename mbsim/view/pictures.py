@@ -7,7 +7,7 @@ import io
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from mbsim.errors import ModelError, ResultsError
@@ -20,6 +20,8 @@ FILM_RATE, GIF_RATE, MOST_FRAMES = 30, 20, 3000
 PNG, GIF, MP4 = ("PNG picture", "--png"), ("GIF picture", "--gif"), ("film", "--mp4")
 #: Seconds that a film takes where no speed is asked for: at least, at most.
 _SHORT, _LONG = 2.5, 20.0
+#: What is told how many pictures of a film there are, and how many there will be.
+Progress = Callable[[int, int], None]
 
 
 def check_tools(png: Path | None, gif: Path | None, mp4: Path | None) -> None:
@@ -68,9 +70,12 @@ class Camera:
             raise ModelError(f"{count} frames are more than {MOST_FRAMES}: take a higher --speed")
         return [first + (last - first) * k / (count - 1) for k in range(count)]
 
-    def frames(self, times: list[float]) -> Iterator[bytes]:
+    def frames(self, times: Sequence[float], progress: Progress | None) -> Iterator[bytes]:
         """Yield the scene at times as PNG."""
-        yield from map(self.picture, times)
+        for done, time in enumerate(times, 1):
+            yield self.picture(time)
+            if progress is not None:
+                progress(done, len(times))
 
 
 def make(
@@ -81,6 +86,7 @@ def make(
     mp4: Path | None = None,
     time: float | None = None,
     speed: float | None = None,
+    progress: Progress | None = None,
 ) -> None:
     """Write pictures of a page.
 
@@ -96,6 +102,8 @@ def make(
         Of the PNG [T]; default: half of the run.
     speed : float, optional
         Of films, in times real time; default: such that one takes 2.5 to 20 seconds.
+    progress : callable, optional
+        Called as ``progress(done, count)`` after each picture of a film.
 
     Raises
     ------
@@ -111,26 +119,33 @@ def make(
             at = 0.5 * sum(camera.span) if time is None else time
             write_product(png, camera.picture(at), *PNG)
         if gif is not None:
-            write_product(gif, _gif(camera.frames(camera.times(GIF_RATE, speed))), *GIF)
+            times = camera.times(GIF_RATE, speed)
+            middle = camera.picture(times[len(times) // 2])
+            write_product(gif, _gif(camera.frames(times, progress), middle), *GIF)
         if mp4 is not None:
             film = Path(folder) / "film.mp4"
-            _film(camera.frames(camera.times(FILM_RATE, speed)), film)
+            _film(camera.frames(camera.times(FILM_RATE, speed), progress), film)
             write_product(mp4, film.read_bytes(), *MP4)
 
 
-def _gif(frames: Iterator[bytes]) -> bytes:
-    """Return frames as an animated GIF that repeats, all with the colours of the first."""
+def _gif(frames: Iterator[bytes], middle: bytes) -> bytes:
+    """Return frames as an animated GIF that repeats, all with the colours of the middle one.
+
+    One frame is held at a time.
+    """
     from PIL import Image
 
-    pictures = [Image.open(io.BytesIO(frame)).convert("RGB") for frame in frames]
-    colours = pictures[len(pictures) // 2].quantize(255)
-    reduced = [picture.quantize(palette=colours) for picture in pictures]
+    def opened(frame: bytes) -> Image.Image:
+        return Image.open(io.BytesIO(frame)).convert("RGB")
+
+    colours = opened(middle).quantize(255)
+    reduced = (opened(frame).quantize(palette=colours) for frame in frames)
     made = io.BytesIO()
-    reduced[0].save(
+    next(reduced).save(
         made,
         "GIF",
         save_all=True,
-        append_images=reduced[1:],
+        append_images=reduced,
         duration=1000 // GIF_RATE,
         loop=0,
         optimize=False,

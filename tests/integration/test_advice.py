@@ -137,7 +137,10 @@ def test_joints_are_not_guessed_about():
     ("units", "written"),
     [
         ("", {"9.81 N of", "m deep", "m/s by a mass of 1 kg", "s long"}),
-        ('force_unit="POUND_FORCE" mass_unit="SLUG" length_unit="FOOT"', {"lbf of", "ft/s", "slug"}),
+        (
+            'force_unit="POUND_FORCE" mass_unit="SLUG" length_unit="FOOT"',
+            {"lbf of", "ft/s", "slug"},
+        ),
         ('mass_unit="TONNE" length_unit="MILLIMETER"', {"N of", "mm deep", "mm/s by", "1 t:"}),
     ],
 )

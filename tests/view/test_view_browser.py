@@ -222,7 +222,9 @@ def test_a_picture_looks_as_it_did(text, tmp_path):
 def test_a_gif_moves(text, tmp_path):
     from PIL import Image
 
-    make(text, (160, 100), gif=tmp_path / "a.gif", speed=0.5)
+    told = []
+    make(text, (160, 100), gif=tmp_path / "a.gif", speed=0.5, progress=lambda *at: told.append(at))
+    assert told == [(done, 20) for done in range(1, 21)]
     with Image.open(tmp_path / "a.gif") as film:
         assert film.n_frames == 20
         first = np.asarray(film.convert("RGB"), dtype=float)
