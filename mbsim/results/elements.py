@@ -69,6 +69,16 @@ def facts(model: Model) -> Iterator[tuple[str, dict[str, str]]]:
             )
 
 
+def labels(model: Model, group: str) -> dict[str, int]:
+    """Return the labels of the elements of a group of a result file, ``bodies``, with their ids."""
+    tables: dict[str, Mapping[int, Any]] = {
+        "bodies": model.bodies,
+        "requests": model.requests,
+        **{each.path: elements_of(model, name) for name, each in GROUPS.items()},
+    }
+    return {each.label: id for id, each in tables.get(group, {}).items() if each.label}
+
+
 def equations(model: Model) -> int:
     """Return how many scalar equations the model's constraints are, redundant ones included."""
     from mbsim.joints.catalog import JOINTS

@@ -105,3 +105,15 @@ def _first_id(name: str) -> str:
 def nearest(asked: str, names: Iterable[str]) -> list[str]:
     """Return up to three names that look like the one asked for, nearest first."""
     return difflib.get_close_matches(asked, list(names), n=3, cutoff=0.5)
+
+
+def by_label(asked: str, labels: Mapping[str, int]) -> str | None:
+    """Return a name whose second part is a label, ``bodies/ball/velocity``, with the id instead.
+
+    `labels` are those of the elements of the name's group, with their ids.
+    """
+    group, _, rest = asked.partition("/")
+    part, _, last = rest.partition("/")
+    folded = {label.casefold(): id for label, id in labels.items() if label}
+    id = folded.get(part.casefold())
+    return None if id is None else f"{group}/{id}/{last}".rstrip("/")

@@ -28,7 +28,16 @@ from mbsim.results.form import (
     values_of,
 )
 from mbsim.results.mapping import SignalMapping
-from mbsim.results.names import PARTS, compact, is_pattern, matching, nearest, order, parts_of
+from mbsim.results.names import (
+    PARTS,
+    by_label,
+    compact,
+    is_pattern,
+    matching,
+    nearest,
+    order,
+    parts_of,
+)
 from mbsim.results.opening import opened_file
 from mbsim.results.sensitivities import WithSensitivities
 
@@ -427,6 +436,9 @@ class Results(SignalMapping, WithSensitivities):
             return f"{self.place}: no signal {name!r}; {whole} has {parts}"
         column = _CSV_COLUMN.fullmatch(asked)
         written = f"requests/{column[1]}/{column[2]}" if column else ""
+        group = asked.partition("/")[0]
+        labels = {self.label(f"{group}/{id}"): id for id in self.ids(group)}
+        written = written or by_label(asked, labels) or ""
         near = [written] if written and written in self else nearest(asked, known)
         hint = f"; did you mean {' or '.join(near)}?" if near else ""
         if _OF_REQUEST.match(asked):

@@ -25,10 +25,10 @@ from mbsim.arrays.codes import (
 from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
 from mbsim.errors import UnknownSignal
 from mbsim.results.blocks import Block
-from mbsim.results.elements import GROUPS, acting
+from mbsim.results.elements import GROUPS, acting, labels
 from mbsim.results.forces import Forces
 from mbsim.results.motion import motion
-from mbsim.results.names import PARTS, compact, nearest, parts_of
+from mbsim.results.names import PARTS, by_label, compact, nearest, parts_of
 from mbsim.results.requests import MAGNITUDES, places, request_table
 from mbsim.results.signals import names_of
 from mbsim.results.watch import energies
@@ -113,7 +113,9 @@ class SignalsNow(Mapping[str, Any]):
                 return self._component(whole, get, PARTS[size][part])
             parts = ", ".join(parts_of(size)) or "no parts"
             raise UnknownSignal(f"no signal {name!r}; {whole} has {parts}")
-        near = nearest(name.strip("/"), self._known)
+        asked = name.strip("/")
+        written = by_label(asked, labels(self._system.model, asked.partition("/")[0]))
+        near = [written] if written and written in self else nearest(asked, self._known)
         hint = f"; did you mean {' or '.join(near)}?" if near else ""
         raise UnknownSignal(f"no signal {name!r}{hint}; there is {', '.join(compact(self._names))}")
 

@@ -215,6 +215,19 @@ def test_signals_are_those_of_the_result_file():
             sim.signals["bodies/2/position/w"]
 
 
+def test_a_label_in_place_of_an_id_is_told_its_id():
+    deck = pushed().replace('id="2" cg_id', 'id="2" label="Slider" cg_id')
+    deck = deck.replace('Constraint_Joint id="1"', 'Constraint_Joint id="1" label="rail"')
+    with mbsim.open(deck) as sim:
+        for said in (sim.signals, sim.results()):
+            for asked, meant in (
+                ("bodies/slider/velocity/x", "bodies/2/velocity/x"),
+                ("joints/rail/force", "joints/1/force"),
+            ):
+                with pytest.raises(UnknownSignal, match=rf"did you mean {meant}\?"):
+                    said[asked]
+
+
 def test_inputs_are_found_by_label_and_by_path():
     with mbsim.open(pushed()) as sim:
         assert dict(sim.inputs) == {"push": 0.0, "spring": 100.0}
