@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -188,20 +189,19 @@ class SignalsNow(Mapping[str, Any]):
 
         A controller reads them at every step: plain numbers are read sooner than arrays.
         """
-        rows, evaluate = self._rows, self._evaluate
+        value, evaluate = self._rows.value, self._evaluate
         given = places(request, self._system.values)
         first, end = min(given.values(), default=0), max(given.values(), default=-1) + 1
         # of a number that the deck does not give, the 0 behind those that it gives
-        order = [given.get(number, end) - first for number in range(1, 9)]
+        numbers = itemgetter(*(given.get(number, end) - first for number in range(1, 9)))
         magnitudes = [number for number in MAGNITUDES if number not in given]
 
         def now() -> Any:
-            values = rows.value[evaluate(), first:end].tolist()
+            values = value[evaluate(), first:end].tolist()
             values.append(0.0)
-            found = [values[k] for k in order]
+            found = list(numbers(values))
             for k in magnitudes:
-                x, y, z = found[k : k + 3]
-                found[k - 1] = math.sqrt(x * x + y * y + z * z)
+                found[k - 1] = math.hypot(*found[k : k + 3])
             return np.array(found)
 
         return now

@@ -11,7 +11,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbsim.arrays.codes import ANEW, USED_ROWS
+from mbsim.arrays.codes import ANEW, USED_EVENTS, USED_INCIDENTS, USED_ROWS
 from mbsim.core import problem
 from mbsim.errors import ModelError
 from mbsim.integrators import scheme
@@ -82,6 +82,9 @@ class Stepper(Runner):
         self._budget, self._closed, self._failed = FIRST_BUDGET, False, False
         self._at = np.zeros(len(self.method.y))
         self._write = self.hooks.writer(self._at, self.method.error)
+        # numbers are read sooner from a view than from an array
+        self._used = memoryview(system.scene.rows.used)
+        self._numbers = memoryview(self._memory)
         self.inputs = Inputs(system.model, system.scene, names, self._input_changed)
         self.moving_inputs = self._moving_inputs()
         self.signals = SignalsNow(system, lambda: self.time, self.method.y, self._row_now)
@@ -93,7 +96,7 @@ class Stepper(Runner):
 
         A sensor may have ended it early. Steps whose sum is the end but for rounding end there.
         """
-        now, end = float(self._memory[scheme.TIME]), self.settings.end_time
+        now, end = self._numbers[scheme.TIME], self.settings.end_time
         t = now + dt
         return self.step_to(end if now < end < t + _ROUNDED * dt else t)
 
@@ -107,7 +110,7 @@ class Stepper(Runner):
         SolverError, PluginError
             As `simulate` raises them; a `state` from before can be gone back to.
         """
-        now = float(self._memory[scheme.TIME])
+        now = self._numbers[scheme.TIME]
         if not t > now or self._closed or self._failed or self.sensing.halted_by:
             return self._no_step(t, now)
         t = self._within(t)
@@ -314,18 +317,18 @@ class Stepper(Runner):
 
     def _row_now(self) -> int:
         """Return which row of the scene's tables holds the present time; it is not taken."""
-        rows = self.system.scene.rows
-        row = int(rows.used[USED_ROWS])
+        used = self._used
+        row: int = used[USED_ROWS]
         if self._fresh:
             self._open()
-            used = rows.used.tolist()
-            self._at[:] = self.method.y
+            incidents, events = used[USED_INCIDENTS], used[USED_EVENTS]
+            np.copyto(self._at, self.method.y)
             within = 0.0
             if self.methods.steps.order == 0.0:
                 # forces that depend on a fixed step are shown as they acted
-                within = self._memory.item(scheme.LAST_STEP)
-            self._write(self._memory.item(scheme.TIME), within)
-            rows.used[:] = used
+                within = self._numbers[scheme.LAST_STEP]
+            self._write(self._numbers[scheme.TIME], within)
+            used[USED_ROWS], used[USED_INCIDENTS], used[USED_EVENTS] = row, incidents, events
             self._fresh = False
         return row
 
