@@ -16,8 +16,8 @@ from mbsim.view.scene import Scene
 _STATIC = Path(__file__).parent / "static"
 #: Our scripts in the order in which they need each other.
 _SCRIPTS = (
-    *("unpack", "run", "shapes", "ground", "stage", "contacts", "extras", "curves", "view"),
-    "start",
+    *("unpack", "run", "lit", "shapes", "ground", "stage", "contacts", "extras", "curves"),
+    *("view", "start"),
 )
 #: Makes the view of a page that is nothing else.
 _MOUNT = """

@@ -80,7 +80,9 @@ def click(page, x, y):
 def shot(page):
     from PIL import Image
 
-    data = page.run("(mbsimView.draw(), mbsimView.canvas.toDataURL())").partition(",")[2]
+    data = page.run(
+        "(mbsimView.stage.setCoarse(false), mbsimView.draw(), mbsimView.canvas.toDataURL())"
+    ).partition(",")[2]
     return np.asarray(Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB"), dtype=float)
 
 

@@ -28,7 +28,7 @@ mbsim.extras = (function () {
       for (const connection of run.about.connections) {
         if (connection.i < 0) { continue; }
         if (CONSTRAINTS.includes(connection.group)) {
-          const material = new THREE.MeshStandardMaterial({ color: JOINT, roughness: 0.4, depthTest: false, transparent: true, opacity: 0.9 });
+          const material = mbsim.lit.material({ color: JOINT, depthTest: false, transparent: true, opacity: 0.9 }, 0.4, 0);
           const mesh = new THREE.Mesh(glyph(connection.type), material);
           mesh.matrixAutoUpdate = false;
           mesh.renderOrder = 2;

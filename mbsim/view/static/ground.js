@@ -3,7 +3,7 @@
 mbsim.ground = (function () {
   // Lines of a grid that fade towards the rim, on a material that takes light and shadow.
   function gridMaterial(look) {
-    const made = new THREE.MeshStandardMaterial({ color: look.paper, roughness: 0.95, metalness: 0, transparent: true });
+    const made = mbsim.lit.material({ color: look.paper, transparent: true }, 0.95, 0);
     made.userData.uniforms = {
       cell: { value: look.cell }, ink: { value: new THREE.Color(look.ink) },
       middle: { value: new THREE.Vector3() }, rim: { value: look.rim },

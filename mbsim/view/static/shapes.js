@@ -103,10 +103,10 @@ mbsim.shapes = (function () {
   }
 
   function material(how, look) {
-    const made = new THREE.MeshStandardMaterial({ color: 0xffffff, roughness: 0.48, metalness: 0.08 });
+    const made = mbsim.lit.material({ color: 0xffffff }, how === "floor" ? 0.95 : 0.48, 0.08);
     if (look.ghost) { Object.assign(made, { transparent: true, opacity: 0.42, depthWrite: false }); }
     if (how === "mesh") { made.side = THREE.DoubleSide; }
-    if (how === "floor") { made.roughness = 0.95; return gridded(made, look.cell); }
+    if (how === "floor") { return gridded(made, look.cell); }
     return how === "octants" || how === "sectors" ? marked(made, how) : made;
   }
 

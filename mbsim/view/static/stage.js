@@ -86,20 +86,12 @@ mbsim.Stage = (function () {
     return [0, 1, 2].map((k) => Math.cos(angle) * x[k] + Math.sin(angle) * y[k]);
   }
 
-  // Whether a processor draws: smooth edges of many triangles take it longer than all else.
-  function drawnByProcessor() {
-    const gl = document.createElement("canvas").getContext("webgl2");
-    if (!gl) { return false; }
-    const info = gl.getExtension("WEBGL_debug_renderer_info");
-    const name = gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER);
-    const lose = gl.getExtension("WEBGL_lose_context");
-    if (lose) { lose.loseContext(); }
-    return /swiftshader|llvmpipe|softpipe|software/i.test(name);
-  }
-
   class Stage {
     constructor(canvas, run) {
-      this.renderer = new THREE.WebGLRenderer({ canvas, antialias: location.hash === "#picture" || !drawnByProcessor() });
+      // where a processor draws, smooth edges of many triangles take it longer than all else
+      this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !mbsim.lit.slow });
+      // whether half the pixels in width and height are drawn, as they are there while things move
+      this.coarse = mbsim.lit.slow;
       this.renderer.shadowMap.enabled = true;
       this.renderer.shadowMap.type = THREE.PCFShadowMap;
       this.renderer.toneMapping = THREE.NeutralToneMapping;
@@ -230,10 +222,18 @@ mbsim.Stage = (function () {
     }
 
     resize(width, height, ratio) {
-      this.renderer.setPixelRatio(ratio);
+      this.ratio = ratio;
+      this.renderer.setPixelRatio(this.coarse ? ratio / 2 : ratio);
       this.renderer.setSize(width, height, false);
       this.camera.aspect = width / height;
       this.camera.updateProjectionMatrix();
+    }
+
+    // Draw with all pixels from now on, or with half of them in width and height.
+    setCoarse(coarse) {
+      if (coarse === this.coarse) { return; }
+      this.coarse = coarse;
+      this.renderer.setPixelRatio(coarse ? this.ratio / 2 : this.ratio);
     }
 
     render() {

@@ -14,6 +14,8 @@ mbsim.View = (function () {
     ["D P ?", "dark or light, panel, these keys"],
   ];
   const ACTIONS = { home: "goHome", theme: "themeNext", help: "help", panel: "panel", play: "play" };
+  // Milliseconds without a change after which a slow machine draws with all pixels.
+  const STILL_AFTER = 250;
   const TINT = 0xe0782f;
   const { shown } = mbsim.Curves;
 
@@ -377,8 +379,11 @@ mbsim.View = (function () {
 
     resize() {
       const width = this.root.clientWidth, height = this.root.clientHeight;
-      if (!width || !height) { return; }
-      this.stage.resize(width, height, Math.min(2, devicePixelRatio || 1));
+      const size = [width, height, Math.min(2, devicePixelRatio || 1)];
+      // an observer tells the size once at its start, where nothing has changed
+      if (!width || !height || String(size) === String(this.size)) { return; }
+      this.size = size;
+      this.stage.resize(...size);
       this.frame();
       this.marks();
       this.curves.draw();
@@ -455,7 +460,14 @@ mbsim.View = (function () {
         this.setTime(time);
       }
       this.stage.controls.update();
-      if (!this.changed) { return; }
+      if (this.changed) {
+        this.stage.setCoarse(mbsim.lit.slow);
+        this.moved = now;
+      } else if (!this.stage.coarse || now - this.moved < STILL_AFTER) {
+        return;
+      } else {
+        this.stage.setCoarse(false);
+      }
       this.draw();
       this.curves.cursor(this.time);
       if (this.selected !== null) { this.numbers(); }
