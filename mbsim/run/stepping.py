@@ -83,8 +83,8 @@ class Stepper(Runner):
         self._at = np.zeros(len(self.method.y))
         self._write = self.hooks.writer(self._at, self.method.error)
         # numbers are read sooner from a view than from an array
-        self._used = memoryview(system.scene.rows.used)
-        self._numbers = memoryview(self._memory)
+        self._used = system.scene.rows.used.data
+        self._numbers = self._memory.data
         self.inputs = Inputs(system.model, system.scene, names, self._input_changed)
         self.moving_inputs = self._moving_inputs()
         self.signals = SignalsNow(system, lambda: self.time, self.method.y, self._row_now)
