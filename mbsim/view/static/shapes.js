@@ -169,6 +169,12 @@ mbsim.shapes = (function () {
     return geometry;
   }
 
+  // Sides of round bodies, even: a ball of n sides has n * n triangles.
+  function sidesOf(count) {
+    const most = mbsim.lit.slow ? 1e5 : 6e5;
+    return 2 * Math.round(0.5 * Math.min(56, Math.max(10, Math.sqrt(most / Math.max(count, 1)))));
+  }
+
   // Geometry of a kind of shape, how it is marked, and the scale of a shape's instance.
   function kindOf(run, k, round, look) {
     const size = run.arrays.shape_size.subarray(7 * k, 7 * k + 3);
@@ -255,7 +261,7 @@ mbsim.shapes = (function () {
       this.run = run;
       this.look = look;
       const shapes = run.about.shapes, sets = new Map();
-      const round = shapes.length > 3000 ? 14 : shapes.length > 400 ? 24 : 56;
+      const round = sidesOf(shapes.length);
       shapes.forEach((shape, k) => {
         const kind = kindOf(run, k, round, look);
         if (!kind) { return; }

@@ -427,8 +427,9 @@ mbsim.View = (function () {
     // Draw one frame; the time that the script takes is remembered.
     draw() {
       const began = performance.now();
-      this.stage.renderer.shadowMap.enabled = this.on.shadows;
-      this.stage.sun.castShadow = this.on.shadows;
+      const shadows = this.on.shadows && !this.stage.coarse;
+      this.stage.renderer.shadowMap.enabled = shadows;
+      this.stage.sun.castShadow = shadows;
       this.stage.ground.visible = this.on.ground;
       this.runs.forEach((run, k) => {
         this.groups[k].visible = k === 0 || this.on.second;
