@@ -44,7 +44,8 @@ class Change:
 class Simulation:
     """One Simulate statement: from the end of the one before (or `start_time`) to `end_time`.
 
-    STATIC and ASSEMBLY take no time: both are where they stand.
+    STATIC and ASSEMBLY take no time: both are where they stand. KINEMATIC is a TRANSIENT of a model
+    that has no degree of freedom.
     """
 
     analysis_type: str = "TRANSIENT"

@@ -276,7 +276,7 @@ class Runner:
     def _begin_stage(self, stage: Stage) -> bool:
         """Begin one Simulate statement with its first row; return whether it goes on."""
         from mbsim.integrators import scheme
-        from mbsim.run.start import limit_first
+        from mbsim.run.start import check_kinematic, limit_first
         from mbsim.run.statics import balance_bodies
 
         method, simulation = self.method, stage.simulation
@@ -296,6 +296,8 @@ class Runner:
         t, goes_on = simulation.start_time, True
         if self.commands.interrupts(self.stage):
             self.commands.assemble(self.stage, self.hooks, t, method.y, self.log.line, self.say)
+        if simulation.analysis_type == "KINEMATIC":
+            check_kinematic(self.system, simulation)
         if simulation.analysis_type == "STATIC":
             balance_bodies(self.system, self.hooks, simulation, method.y, method.k[0], self.say)
             goes_on = False

@@ -9,11 +9,13 @@ import numpy as np
 
 from mbsim.errors import ModelError
 from mbsim.geometry.catalog import AT_DEPTH
+from mbsim.model.names import is_adams
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
     from mbsim.dynamics.initial.assembly import Assembly
     from mbsim.integrators.scheme import Method
+    from mbsim.model.simulation import Simulation
     from mbsim.run.hook_calls import HookCalls
     from mbsim.run.settings import Settings
 
@@ -77,6 +79,24 @@ def assemble_again(system: System, hooks: HookCalls, t: float, y: Any) -> Assemb
         return assemble(system.scene, y, serve, {})
     except ContradictionError as error:
         raise ModelError(contradiction(system, error)) from None
+
+
+def check_kinematic(system: System, simulation: Simulation) -> None:
+    """Raise `ModelError` where a kinematic analysis is asked of what forces would move."""
+    from mbsim.results.log import freedom
+
+    count = freedom(system)
+    if count is None:
+        count = 6 * len(system.body_ids)
+    if count > 0:
+        model, adams = system.model, is_adams(system.model.file)
+        statement = "SIMULATE/KINEMATICS" if adams else "Simulate: analysis_type KINEMATIC"
+        dynamic = "DYNAMICS" if adams else "TRANSIENT"
+        raise ModelError(
+            f"{simulation.source.file or model.file}:{simulation.source.line}: {statement}: "
+            f"degrees of freedom: {count}, where a kinematic analysis takes 0; "
+            f"drive them by motions, or let {dynamic} find how forces move them"
+        )
 
 
 def settle_contacts(

@@ -9,7 +9,8 @@ import pytest
 
 import mbsim
 from helpers.decks import EARTH
-from mbsim.errors import DeckError, Interrupted
+from helpers.folders import MODELS
+from mbsim.errors import DeckError, Interrupted, ModelError
 
 BODY = """<Body_Rigid id="2" cg_id="20" mass="2" inertia_xx="1" inertia_yy="1" inertia_zz="1"/>
 <Reference_Marker id="20" body_id="2" pos_z="-1"/>"""
@@ -253,3 +254,17 @@ def test_check_and_info_show_the_sequence(tmp_path):
     assert [s["analysis_type"] for s in made] == ["STATIC", "TRANSIENT", "TRANSIENT"]
     assert [(s["start_time"], s["end_time"]) for s in made] == [(0, 0), (0, 1), (1, 2)]
     assert made[-1]["changes"] == ['Force_SpringDamper[7]: stiffness="250"']
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("pendulum_wheel.xml", r"degrees of freedom: 4, where a kinematic analysis takes 0"),
+        ("free_top.xml", r"degrees of freedom: 6, where a kinematic analysis takes 0"),
+    ],
+)
+def test_a_kinematic_analysis_of_what_forces_move_is_refused(name, said):
+    text = (MODELS / name).read_text("utf-8")
+    model = mbsim.read_model(text.replace('analysis_type="Transient"', 'analysis_type="Kinematic"'))
+    with pytest.raises(ModelError, match=said):
+        mbsim.simulate(model)

@@ -31,7 +31,7 @@ _KINDS = {
     "STATICS": "STATIC",
     "DYNAMICS": "TRANSIENT",
     "TRANSIENT": "TRANSIENT",
-    "KINEMATICS": "TRANSIENT",
+    "KINEMATICS": "KINEMATIC",
     "INITIAL_CONDITIONS": "ASSEMBLY",
 }
 
@@ -42,8 +42,6 @@ def _build_simulate(entry: Entry) -> None:
     if kind is None:
         require(entry, "KIND")
         return
-    if kind == "KINEMATICS":
-        entry.note("is run as DYNAMICS: what has no degree of freedom moves alike", "KIND")
     names = {
         "END": "end_time",
         "DURATION": "duration",
