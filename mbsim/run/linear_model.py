@@ -191,10 +191,12 @@ def linearize(run: Stepper, outputs: tuple[str, ...], inputs: tuple[str, ...]) -
         Where f has no slope there, or states that keep to the constraints do not stay what they
         are to first order: joints of a model that moves.
     """
-    kept = run.state
+    # the scene's hooks are one: those of a running implicit method stand there
+    kept, hooks = run.state, run.system.scene.world.hooks.copy()
     try:
         return _linearized(run, outputs, inputs)
     finally:
+        run.system.scene.world.hooks[:] = hooks
         run.state = kept
 
 
@@ -212,7 +214,10 @@ def _linearized(run: Stepper, outputs: tuple[str, ...], inputs: tuple[str, ...])
         raise ModelError(
             "linearize: VERLET's forces follow from its step; open with another method"
         )
-    # the scene's hooks are one; those of a running implicit method are bound again by its state
+    if run.methods.rigid is not None and len(run.system.scene.contacts.id) > 0:
+        raise ModelError(
+            "linearize: rigid contacts have no slope; open with another method than MOREAU"
+        )
     problem, lives = implicit_hooks(run.system.scene, run.problem, False)
     point = _Point(run)
     scales = run.system.scene.world.scale

@@ -15,6 +15,7 @@ from mbsim.arrays.codes import ANEW, USED_EVENTS, USED_INCIDENTS, USED_ROWS
 from mbsim.core import problem
 from mbsim.errors import ModelError
 from mbsim.integrators import scheme
+from mbsim.results.identity import KINDS, Identity
 from mbsim.run.history import Chain, History
 from mbsim.run.inputs import Inputs, with_inputs
 from mbsim.run.loop import FIRST_BUDGET, Runner
@@ -47,11 +48,12 @@ class State:
     arrays: Mapping[str, Any] = field(repr=False)
     halted_by: int = field(repr=False)
     rows: Chain | None = field(repr=False)
+    made_of: Any = field(repr=False)  # of `results.identity`: the model, how it is run
 
     def copy(self) -> State:
         """Return a state with arrays of its own."""
         arrays = {name: np.array(array) for name, array in self.arrays.items()}
-        return State(self.time, self.inputs, arrays, self.halted_by, self.rows)
+        return State(self.time, self.inputs, arrays, self.halted_by, self.rows, self.made_of)
 
 
 class Stepper(Runner):
@@ -78,6 +80,7 @@ class Stepper(Runner):
         super().__init__(system, settings, history, log, tell, changes)
         self._history = history
         self._memory = self.method.memory
+        self._identity = Identity(system, settings)
         self._fresh = True  # whether no row holds the present time
         self._budget, self._closed, self._failed = FIRST_BUDGET, False, False
         self._at = np.zeros(len(self.method.y))
@@ -142,11 +145,13 @@ class Stepper(Runner):
         self._open()
         self._history.take()
         arrays, halted = self.checkpoint(), self.sensing.halted_by
-        return State(self.time, self.inputs.values_now, arrays, halted, self._history.chain)
+        values, rows = self.inputs.values_now, self._history.chain
+        return State(self.time, values, arrays, halted, rows, self._identity.packed)
 
     @state.setter
     def state(self, state: State) -> None:
         self._open()
+        self._check_own(state)
         before = self.stage
         self.system.scene.rows.used[:] = 0
         if int(state.arrays["stage"]) != before:
@@ -255,6 +260,20 @@ class Stepper(Runner):
                 "mbsim.open(..., end_time=T) goes on to T"
             )
         return end
+
+    def _check_own(self, state: State) -> None:
+        """Raise `ModelError` for what is no state of this model run in this way."""
+        file, own = self.system.model.file, self._identity
+        if not isinstance(state, State):
+            raise ModelError(
+                f"{file}: a state is what `sim.state` gives; {type(state).__name__} given"
+            )
+        if state.made_of is own.packed or np.array_equal(state.made_of, own.packed):
+            return
+        for kind, about in KINDS.items():
+            if found := own.changes(state.made_of, kind):
+                raise ModelError(f"{file}: a state of another run: {about.differs}: {found}")
+        raise ModelError(f"{file}: a state of another run")
 
     def _next_stage(self) -> bool:
         """Begin the Simulate that follows; return whether one does in which time goes on."""

@@ -455,7 +455,56 @@ def test_a_pendulum_hanging_and_standing(length):
     assert found.A.shape == (2, 2)
 
 
+@pytest.mark.parametrize("integrator", METHODS)
+def test_a_run_goes_on_after_it_is_linearised_as_it_would_have(integrator):
+    """An implicit method's linearisation stands where that of `linearize` does."""
+    model = mbsim.Model(name="damped")
+    ball = model.body(mass=1, inertia=(0.1,) * 3, pos=(0, 0, 1))
+    model.spring_damper(ball, model.ground, "TRANSLATIONAL", stiffness=1e5, damping=1e5, length=1)
+    model.gravity(grav=(0, 0, -9.81))
+    model.simulate(end_time=5, print_interval=0.1)
+    found = []
+    for looked in (False, True):
+        with mbsim.open(model, integrator=integrator) as sim:
+            sim.step(0.02)
+            if looked:
+                assert sim.linearize().A.shape == (12, 12)
+            sim.step(0.02)
+            found.append(sim.state.arrays["method/y"])
+    np.testing.assert_array_equal(*found)
+
+
+def test_a_state_of_another_run_is_refused_whole():
+    def taken(**how):
+        with mbsim.open(pushed(), **how) as other:
+            other.step(0.3)
+            return other.state
+
+    with mbsim.open(pushed(), integrator="DOPRI5") as sim:
+        sim.inputs["push"] = 2.0
+        sim.step(0.2)
+        before = sim.state
+        for other, said in (
+            (taken(integrator="DOP853"), "integrator was DOP853 and is DOPRI5 now"),
+            (taken(end_time=0.5, integrator="DOPRI5"), "end_time was 0.5"),
+            (
+                taken(integrator="DOPRI5", overrides={"Body_Rigid[2].mass": 2}),
+                r"Body_Rigid\[2\].mass was 2.* and is 1",
+            ),
+            (None, "NoneType given"),
+        ):
+            with pytest.raises(ModelError, match=said):
+                sim.state = other
+        np.testing.assert_array_equal(sim.state.arrays["method/y"], before.arrays["method/y"])
+        sim.state = pickle.loads(pickle.dumps(before))
+        sim.step(0.2)
+        assert len(sim.results()["time"]) == 41
+
+
 def test_what_cannot_be_linearised():
+    with mbsim.open(MODELS / "drop_m.xml", integrator="MOREAU") as sim:
+        with pytest.raises(ModelError, match="rigid contacts have no slope"):
+            sim.linearize()
     with mbsim.open(spun("V"), inputs=["drive"]) as sim:
         with pytest.raises(ModelError, match=r'drive gives a velocity.*val_type="A"'):
             sim.linearize()
