@@ -169,14 +169,16 @@ class _Asked:
         """Return the page, its packs, and the glTF model where one is asked for."""
         from mbsim.results.reading import open_results
         from mbsim.view.gltf import glb
-        from mbsim.view.page import factors, packs_of, page, title_of
+        from mbsim.view.page import packs_of, page, title_of
         from mbsim.view.scene import read_scene
 
         with ExitStack() as stack:
             scenes = [read_scene(stack.enter_context(open_results(file))) for file in self.files]
             model = glb(scenes[0]) if self.gltf is not None else b""
             packs = packs_of(scenes, self.signals)
-            settings = {"factors": factors(scenes), "signals": list(self.signals)}
+            # the script is told whole names
+            names = [each for name in self.signals for each in scenes[0].results.find(name)]
+            settings: dict[str, object] = {"signals": names}
             if self.rest["theme"]:
                 settings["theme"] = self.rest["theme"]
             return page(title_of(scenes), settings, packs), packs, model

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mbsim.results.names import is_pattern, matching, parts_of
+from mbsim.results.names import parts_of
 from mbsim.results.quantities import quantity_of
 from mbsim.results.units import UnitSystem
 from mbsim.view.scene import Scene
@@ -59,6 +59,11 @@ def extreme_rows(values: Table) -> Table:
     return np.array(sorted(kept), dtype=np.uint32)
 
 
+def _whole(scene: Scene, name: str) -> str:
+    """Return the signal of a name that may have a part behind it."""
+    return name if name in scene.results.signals() else name.rpartition("/")[0]
+
+
 def _ordered(scene: Scene, asked: Sequence[str]) -> list[str]:
     """Return the names of signals, what was asked for first, bodies last."""
     signals = [
@@ -73,23 +78,21 @@ def _ordered(scene: Scene, asked: Sequence[str]) -> list[str]:
             return _FIRST.index(group)
         return len(_FIRST) + (group == "bodies")
 
-    wanted = []
-    for name in asked:
-        if is_pattern(name):
-            wanted += matching(name, dict.fromkeys(signals, 1))
-        else:
-            whole = name.strip("/")
-            wanted.append(whole if whole in signals else whole.rpartition("/")[0])
+    # names that poses have are known as well
+    wanted = [_whole(scene, each) for name in asked for each in scene.results.find(name)]
     return list(dict.fromkeys([*(w for w in wanted if w in signals), *sorted(signals, key=rank)]))
 
 
-def channels(scene: Scene, room: int, asked: Sequence[str] = ()) -> Channels:
+def channels(
+    scene: Scene, room: int, asked: Sequence[str] = (), shown: UnitSystem | None = None
+) -> Channels:
     """Return curves that take about so many bytes of a page at most.
 
-    `asked` are names or patterns of signals that come first.
+    `asked` are names or patterns of signals that come first; values are in the units `shown`,
+    which are the run's own where none are given.
     """
     results, widths = scene.results, scene.results.signals()
-    units = UnitSystem.of(results.attributes)
+    shown = shown or scene.units
     about: list[dict[str, Any]] = []
     values: list[Table] = []
     rows: list[Table] = []
@@ -101,15 +104,16 @@ def channels(scene: Scene, room: int, asked: Sequence[str] = ()) -> Channels:
             left_out += 1
             continue
         table = np.asarray(results[name], dtype=np.float64).reshape(n, width)
-        for part, column in _parts(name, width):
-            quantity = quantity_of(results, name, column)
-            found = shortened(table[:, column])
+        for part, column in _parts(name, width, n > MOST_VALUES):
+            quantity = quantity_of(results, name, min(column, width - 1))
+            chosen = np.linalg.norm(table, axis=1) if column == width else table[:, column]
+            found = shortened(chosen * scene.units.factor_to(shown, quantity))
             kept = extreme_rows(found) if n > MOST_VALUES else None
             about.append(
                 {
                     "name": f"{name}/{part}" if part else name,
                     "quantity": quantity.name,
-                    "unit": units.text(quantity),
+                    "unit": shown.text(quantity),
                     "rows": n if kept is None else len(kept),
                     "all": kept is None,
                 }
@@ -126,10 +130,13 @@ def channels(scene: Scene, room: int, asked: Sequence[str] = ()) -> Channels:
     return Channels(about, arrays, left_out)
 
 
-def _parts(name: str, width: int) -> Iterator[tuple[str, int]]:
-    """Yield the parts of a signal and their columns; magnitudes the page finds by itself."""
+def _parts(name: str, width: int, thinned: bool) -> Iterator[tuple[str, int]]:
+    """Yield the parts of a signal and their columns, that of a magnitude behind the last.
+
+    The page finds magnitudes by itself where it has all rows: others are extremes of each part.
+    """
     if width == 1:
         yield "", 0
         return
-    parts = [part for part in parts_of(width) if part != "mag"]
+    parts = [part for part in parts_of(width) if part != "mag" or thinned]
     yield from ((part, column) for column, part in enumerate(parts))

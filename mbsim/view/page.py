@@ -8,7 +8,6 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from mbsim.results.units import POSITION, TIME
 from mbsim.view.packing import text_of
 from mbsim.view.run_data import ROOM, RunData, run_data
 from mbsim.view.scene import Scene
@@ -47,21 +46,10 @@ def scripts() -> str:
     return '"use strict";\nconst mbsim = {};\n' + "\n".join(parts)
 
 
-def factors(scenes: Sequence[Scene]) -> list[dict[str, float]]:
-    """Return what lengths and times of each run are multiplied with to be those of the first."""
-    first = scenes[0].units
-    return [
-        {
-            "length": scene.units.factor_to(first, POSITION),
-            "time": scene.units.factor_to(first, TIME),
-        }
-        for scene in scenes
-    ]
-
-
 def packs_of(scenes: Sequence[Scene], asked: Sequence[str] = ()) -> list[RunData]:
-    """Return the packs of runs that are shown over each other."""
-    return [run_data(scene, ROOM // len(scenes), asked) for scene in scenes]
+    """Return the packs of runs that are shown over each other, in the units of the first."""
+    shown, room = scenes[0].units, ROOM // len(scenes)
+    return [run_data(scene, room, asked, shown) for scene in scenes]
 
 
 def pack_elements(packs: Sequence[RunData]) -> str:
@@ -102,7 +90,7 @@ def page(
     title : str
         Of the page; what comes from decks is escaped here.
     settings : mapping
-        What the script is told: `factors`, `signals`, `theme`, `live`.
+        What the script is told: `signals`, `theme`, `live`.
     packs : sequence of RunData
         Runs that are within the page.
     connect : str

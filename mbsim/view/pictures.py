@@ -28,6 +28,9 @@ def check_tools(png: Path | None, gif: Path | None, mp4: Path | None) -> None:
     """Raise `ModelError` where something is missing that these pictures need, or is in the way."""
     for file, about in ((png, PNG), (gif, GIF), (mp4, MP4)):
         if file is not None:
+            ending = about[1].replace("--", ".")
+            if file.suffix.lower() != ending:
+                raise ModelError(f"{about[1]} {file}: the file must end in {ending}")
             check_product(file, *about)
     if png or gif or mp4:
         needed_browser()
@@ -56,7 +59,10 @@ class Camera:
         self.second = float(page.run("mbsimView.realTime || 1"))
 
     def picture(self, time: float) -> bytes:
-        """Return the scene at a time as PNG."""
+        """Return the scene at a time as PNG; `ModelError` where the run has no such time."""
+        first, last = self.span
+        if not first <= time <= last:
+            raise ModelError(f"--time {time:g}: the run shows times from {first:g} to {last:g}")
         address: str = self.page.run(f"mbsimView.still({time!r})")
         return base64.b64decode(address.partition(",")[2])
 

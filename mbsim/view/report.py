@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
@@ -79,7 +78,7 @@ def _motion(results: Results, told: list[str]) -> str:
         return f"<p>{escape(str(error))}</p>"
     packs = packs_of([scene])
     told += packs[0].warnings
-    settings = escape(json.dumps({"factors": [{"length": 1.0, "time": 1.0}]}))
+    settings = "{}"
     return (
         f'<div class="mbsim-view framed folded" id="view" data-settings="{settings}">'
         f'{static("body.html")}</div>\n<div class="strip" id="strip"></div>\n'

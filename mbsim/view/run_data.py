@@ -10,7 +10,16 @@ import numpy as np
 
 from mbsim.model.elements import Array
 from mbsim.results.names import order
-from mbsim.results.units import ACCELERATION, FORCE, POSITION, SPIN, TIME, VELOCITY, Quantity
+from mbsim.results.units import (
+    ACCELERATION,
+    FORCE,
+    POSITION,
+    SPIN,
+    TIME,
+    VELOCITY,
+    Quantity,
+    UnitSystem,
+)
 from mbsim.view.arrows import arrows, dots
 from mbsim.view.channels import bytes_apart, channels, shortened
 from mbsim.view.colours import FIXED, PALETTE
@@ -43,7 +52,9 @@ class RunData:
     warnings: list[str]
 
 
-def run_data(scene: Scene, room: int = ROOM, asked: Sequence[str] = ()) -> RunData:
+def run_data(
+    scene: Scene, room: int = ROOM, asked: Sequence[str] = (), shown: UnitSystem | None = None
+) -> RunData:
     """Return what a page needs of a run.
 
     Parameters
@@ -53,12 +64,20 @@ def run_data(scene: Scene, room: int = ROOM, asked: Sequence[str] = ()) -> RunDa
         Bytes that it may take in base64, about.
     asked : sequence of str
         Names of signals whose curves come first.
+    shown : UnitSystem, optional
+        Of curves, times and lengths as shown; default: the run's own.
+
+    Raises
+    ------
+    UnknownSignal
+        If there is none of a name that is asked for.
     """
+    shown = shown or scene.units
+    step = _step(scene)
     rows, off = view_rows(scene)
-    arrays, poses = _poses(scene, rows)
+    arrays, poses = _poses(scene, rows, step)
     touching = dots(scene, rows)
     forces = arrows(scene, rows, touching)
-    step = poses["step"]
     for name, made in (("dots", touching), ("arrows", forces)):
         data, count, order_ = planes(quantised(made.point - scene_centre(scene), step))
         arrays |= {name: data, f"{name}_first": made.first.astype(np.uint32)}
@@ -68,16 +87,21 @@ def run_data(scene: Scene, room: int = ROOM, asked: Sequence[str] = ()) -> RunDa
     arrays["arrow_area"] = bytes_apart(shortened(forces.area))
     arrays["arrow_contact"] = forces.contact.astype(np.int32)
     arrays |= _shapes(scene) | _markers(scene) | _meshes(scene)
-    about = {**_about(scene), **poses, "arrows_at_points": forces.at_points}
+    about = {**_about(scene, shown), **poses, "arrows_at_points": forces.at_points}
     taken = len(pack(about, arrays)) * 4 // 3
-    curves = channels(scene, max(room - taken, 100_000), asked)
+    curves = channels(scene, max(room - taken, 100_000), asked, shown)
     arrays |= curves.arrays
     about["channels"] = curves.about
     about["left_out"] = curves.left_out
     about["error"] = off
     about["rows"], about["rows_of_file"] = len(rows), len(scene.time)
     warnings = list(scene.warnings)
-    if off > TOLERANCE:
+    coarse = _rounding(scene, step)
+    if coarse > TOLERANCE:
+        warnings.append(
+            f"bodies go so far that positions are shown to {coarse:.2g} of the scene's size"
+        )
+    elif off > TOLERANCE:
         warnings.append(
             f"rows are left out for size: between those shown, positions are off by up to "
             f"{off:.2g} of the scene's size"
@@ -95,11 +119,22 @@ def scene_centre(scene: Scene) -> Array:
     return middle
 
 
+def _step(scene: Scene) -> float:
+    """Return what positions are rounded to [L]: whole numbers of it must hold the farthest."""
+    far = float(np.abs(scene.poses.p - scene_centre(scene)).max(initial=0.0))
+    return max(_STEP * scene.size, far / (MOST_STEPS / 4))
+
+
+def _rounding(scene: Scene, step: float) -> float:
+    """Return by how much rounding moves a point of a body at most, of the scene's size."""
+    reach = float(scene.reach.max(initial=0.0)) / scene.size
+    return 0.5 * 3**0.5 * step / scene.size + 2.0 * _TURN * reach
+
+
 def view_rows(scene: Scene) -> tuple[np.ndarray[Any, Any], float]:
     """Return the rows to keep, and by how much positions are off at any row, of the size."""
     n, bodies = scene.poses.p.shape[:2]
-    reach = float(scene.reach.max(initial=0.0)) / scene.size
-    rounding = 0.5 * 3**0.5 * _STEP + 2.0 * _TURN * reach
+    rounding = _rounding(scene, _step(scene))
     if n * bodies <= _FEW:
         return np.arange(n), rounding
     share = 0.5 * TOLERANCE
@@ -113,11 +148,10 @@ def view_rows(scene: Scene) -> tuple[np.ndarray[Any, Any], float]:
     return rows, off / scene.size + rounding
 
 
-def _poses(scene: Scene, rows: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+def _poses(scene: Scene, rows: Any, step: float) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the arrays of time and poses, and how they are packed."""
     kept = Poses(scene.poses.p[rows] - scene_centre(scene), scene.poses.q[rows])
     n, bodies = kept.p.shape[:2]
-    step = max(_STEP * scene.size, float(np.abs(kept.p).max(initial=0.0)) / (MOST_STEPS / 4))
     p, p_planes, p_order = planes(quantised(kept.p.reshape(n, 3 * bodies), step))
     q, q_planes, q_order = planes(quantised(kept.q.reshape(n, 4 * bodies), _TURN))
     arrays = {"time": np.asarray(scene.time[rows], dtype="<f8").view("<u4"), "p": p, "q": q}
@@ -135,8 +169,8 @@ def label_of(row: Any) -> str:
     return str(row["label"]) if "label" in (row.dtype.names or ()) else ""
 
 
-def _about(scene: Scene) -> dict[str, Any]:
-    """Return the words and numbers of a run."""
+def _about(scene: Scene, shown: UnitSystem) -> dict[str, Any]:
+    """Return the words and numbers of a run that is shown in some units."""
     results, units = scene.results, scene.units
     column = {id: k for k, id in enumerate(scene.body_ids)}
     quantities = {
@@ -160,6 +194,13 @@ def _about(scene: Scene) -> dict[str, Any]:
         "audit": audit.line if audit is not None else "",
         "audit_warnings": list(audit.warnings) if audit is not None else [],
         "units": {name: units.text(quantity) for name, quantity in quantities.items()},
+        # lengths and times of this run are multiplied with these to be shown
+        "factor": {
+            "length": units.factor_to(shown, POSITION),
+            "time": units.factor_to(shown, TIME),
+        },
+        "shown": {"position": shown.text(POSITION), "time": shown.text(TIME)},
+        "second": 1.0 / shown.factor_to(UnitSystem(), TIME),
         "gravity": scene.gravity.tolist(),
         "up": scene.up.tolist(),
         "size": scene.size,

@@ -14,7 +14,7 @@ from typing import Any
 from mbsim.errors import MbsimError, ResultsError
 from mbsim.results.opening import read_apart
 from mbsim.results.reading import open_results
-from mbsim.view.page import factors, packs_of, page, title_of
+from mbsim.view.page import packs_of, page, title_of
 from mbsim.view.run_data import RunData
 from mbsim.view.scene import read_scene
 
@@ -33,7 +33,6 @@ class Served:
         self._running = True
         self._message = "no output row yet"
         self.title = " and ".join(file.stem for file in self.files)
-        self.factors: list[dict[str, float]] = []
 
     def _now(self) -> str:
         """Return what is another one whenever a file is published anew."""
@@ -54,17 +53,17 @@ class Served:
                 return
             try:
                 found = read_apart(self._read, *self.files)
-                self._packs, self._running, self.title, self.factors = found
+                self._packs, self._running, self.title = found
                 self._version = version
             except MbsimError as error:
                 self._message = str(error)
 
-    def _read(self) -> tuple[list[RunData], bool, str, list[dict[str, float]]]:
-        """Return packs, whether a run goes on, title and factors."""
+    def _read(self) -> tuple[list[RunData], bool, str]:
+        """Return packs, whether a run goes on, and title."""
         with ExitStack() as stack:
             scenes = [read_scene(stack.enter_context(open_results(file))) for file in self.files]
             running = any(scene.results.status == "running" for scene in scenes)
-            return packs_of(scenes, self.asked), running, title_of(scenes), factors(scenes)
+            return packs_of(scenes, self.asked), running, title_of(scenes)
 
     def state(self) -> dict[str, Any]:
         """Return what a page asks for now and then."""
@@ -75,7 +74,6 @@ class Served:
                 "runs": len(self._packs),
                 "running": self._running,
                 "message": self._message,
-                "factors": self.factors,
             }
 
     def pack(self, number: int) -> bytes | None:

@@ -12,14 +12,16 @@ import pytest
 import trimesh
 from click.testing import CliRunner
 
+import mbsim
 from helpers.views import HOSTILE, run_balls
 from mbsim.cli.main import main
-from mbsim.errors import ModelError
+from mbsim.errors import ModelError, UnknownSignal
 from mbsim.results.reading import open_results
 from mbsim.view import pictures
+from mbsim.view.channels import MOST_VALUES
 from mbsim.view.gltf import glb
 from mbsim.view.packing import from_planes, unpack
-from mbsim.view.page import page, scripts
+from mbsim.view.page import packs_of, page, scripts
 from mbsim.view.run_data import TOLERANCE, run_data
 from mbsim.view.scene import read_scene
 
@@ -44,6 +46,83 @@ def test_positions_of_a_pack_are_those_of_the_file(scene):
     turns = from_planes(arrays["q"], about["q"]["planes"], about["q"]["order"], rows, 4 * bodies)
     assert np.abs(turns.reshape(rows, bodies, 4) * about["turn"] - scene.poses.q).max() < 2e-5
     np.testing.assert_array_equal(arrays["time"].tobytes(), scene.time.astype("<f8").tobytes())
+
+
+def falling(folder, units="", end=0.5, interval=0.01, speed=1.0, size=0.1):
+    """Return the scene of a ball that flies, in units of the deck."""
+    deck = f"""<MotionSolve><Model><Param_Unit {units}/>
+    <Body_Rigid id="1" isground="TRUE"/>
+    <Body_Rigid id="2" mass="1" cg_id="20" inertia_xx="1" inertia_yy="1" inertia_zz="1"
+      v_ic_x="{speed}" v_ic_x_flag="TRUE"/>
+    <Reference_Marker id="10" body_id="1"/><Reference_Marker id="20" body_id="2"/>
+    <Post_Graphic id="200" type="Sphere" center_marker_id="20" radius="{size}"/></Model>
+    <Command><Simulate analysis_type="Transient" end_time="{end}" print_interval="{interval}"/>
+    </Command></MotionSolve>"""
+    folder.mkdir()
+    (folder / "ball.xml").write_text(deck)
+    mbsim.simulate(mbsim.read_model(folder / "ball.xml"), output=folder).close()
+    return folder / "ball.h5"
+
+
+def test_a_second_run_is_shown_in_the_units_of_the_first(tmp_path):
+    metres = falling(tmp_path / "m")
+    other = falling(
+        tmp_path / "mm",
+        'length_unit="MILLIMETER" time_unit="MILLISECOND"',
+        end=500,
+        interval=10,
+        size=100,
+    )
+    with open_results(metres) as one, open_results(other) as two:
+        packs = [unpack(pack.data) for pack in packs_of([read_scene(one), read_scene(two)])]
+    found = []
+    for about, arrays in packs:
+        at = 0
+        for channel in about["channels"]:
+            if channel["name"] == "bodies/2/velocity/x":
+                assert channel["unit"] == "m/s"
+                # bytes of the same place stand together
+                values = arrays["channels"].reshape(4, -1).T.copy().view("<f4").reshape(-1)
+                found.append(values[at : at + channel["rows"]])
+            at += channel["rows"]
+        assert about["shown"]["position"] == "m"
+    assert packs[1][0]["factor"] == {"length": 1e-3, "time": 1e-3}
+    assert [each[0] for each in found] == pytest.approx([1.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("unit", "second"), [("SECOND", 1.0), ("MINUTE", 1 / 60), ("MICROSECOND", 1e6)]
+)
+def test_a_page_knows_how_long_a_second_is(tmp_path, unit, second):
+    with open_results(falling(tmp_path / "run", f'time_unit="{unit}"')) as results:
+        about, _ = unpack(run_data(read_scene(results)).data)
+    assert about["second"] == pytest.approx(second)
+
+
+def test_a_curve_that_is_not_there_is_refused(scene):
+    with pytest.raises(UnknownSignal, match="no signal 'nope'"):
+        run_data(scene, asked=["nope"])
+    about, _ = unpack(run_data(scene, asked=["bodies/*/velocity"]).data)
+    assert about["channels"][0]["name"] == "bodies/2/velocity/x"
+
+
+def test_magnitudes_of_a_long_run_are_packed(tmp_path):
+    with open_results(falling(tmp_path / "run", interval=1e-4)) as results:
+        about, _ = unpack(run_data(read_scene(results)).data)
+    names = {channel["name"]: channel["rows"] for channel in about["channels"]}
+    assert 2 <= names["bodies/2/velocity/mag"] <= MOST_VALUES
+
+
+def test_a_body_that_goes_far_is_said_to_be_shown_coarsely(tmp_path):
+    with open_results(falling(tmp_path / "run", end=1000, interval=10, speed=7e3)) as results:
+        scene = read_scene(results)
+        pack = run_data(scene)
+    about, arrays = unpack(pack.data)
+    steps = from_planes(arrays["p"], about["p"]["planes"], about["p"]["order"], about["rows"], 3)
+    off = np.abs(steps * about["step"] + about["centre"] - scene.poses.p.reshape(-1, 3)).max()
+    assert off < pack.error * scene.size
+    assert pack.error > TOLERANCE
+    assert "bodies go so far" in " ".join(pack.warnings)
 
 
 def test_a_page_needs_nothing_else_and_is_small(scene):

@@ -4,10 +4,10 @@ mbsim.Run = (function () {
   const { fromPlanes, together } = mbsim.unpack;
 
   class Run {
-    // `factor`: what lengths and times of this run are multiplied with to be those of the first.
-    constructor(pack, factor) {
+    constructor(pack) {
       const { about, arrays } = pack;
-      Object.assign(this, { about, arrays, factor });
+      // `factor`: what lengths and times of this run are multiplied with to be those of the first
+      Object.assign(this, { about, arrays, factor: about.factor });
       const rows = about.rows, bodies = about.bodies.length;
       this.rows = rows;
       this.bodies = about.bodies;
@@ -119,7 +119,8 @@ mbsim.Run = (function () {
       const found = [];
       for (const name of this.channels.keys()) {
         found.push(name);
-        if (name.endsWith("/z") && this.channels.has(name.slice(0, -1) + "x")) { found.push(name.slice(0, -1) + "mag"); }
+        const whole = name.slice(0, -1);
+        if (name.endsWith("/z") && this.channels.has(whole + "x") && !this.channels.has(whole + "mag")) { found.push(whole + "mag"); }
       }
       for (const body of this.bodies) {
         for (const part of ["x", "y", "z"]) { found.push(`bodies/${body.id}/position/${part}`); }
@@ -147,9 +148,9 @@ mbsim.Run = (function () {
         if (body < 0 || part < 0) { return null; }
         const values = new Float64Array(this.rows);
         for (let r = 0; r < this.rows; r += 1) {
-          values[r] = this.about.centre[part] + this.about.step * this.steps[3 * (this.bodies.length * r + body) + part];
+          values[r] = this.factor.length * (this.about.centre[part] + this.about.step * this.steps[3 * (this.bodies.length * r + body) + part]);
         }
-        return { time: this.time, values, unit: this.about.units.position, quantity: "Position" };
+        return { time: this.time, values, unit: this.about.shown.position, quantity: "Position" };
       }
       return null;
     }
@@ -164,7 +165,6 @@ mbsim.Run = (function () {
       const parts = ["x", "y", "z"].map((part) => this.channels.get(`${whole}/${part}`));
       if (parts.some((part) => !part)) { return null; }
       const [x, y, z] = parts;
-      if (!x.all) { return null; } // extremes of components are those of different rows
       const values = Float64Array.from(x.values, (value, k) => Math.hypot(value, y.values[k], z.values[k]));
       return { time: this.timesOf(x), values, unit: x.unit, quantity: x.quantity };
     }

@@ -1,7 +1,8 @@
 "use strict";
 // The view: runs on a stage, with time, selection, curves and keys. `mbsim.mount` makes one.
 mbsim.View = (function () {
-  const SPEEDS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10];
+  // Times real time: 1, 2, 5 and their powers of ten.
+  const SPEEDS = Array.from({ length: 37 }, (_, k) => Number(`${[1, 2, 5][k % 3]}e${Math.floor(k / 3) - 6}`));
   const SWITCHES = [
     ["shapes", "shapes", true], ["ground", "ground", true], ["dots", "contact points", true], ["forces", "contact forces", true],
     ["joints", "joints", true], ["links", "springs, forces", true], ["markers", "markers", false], ["paths", "paths", true],
@@ -44,9 +45,8 @@ mbsim.View = (function () {
 
     // Let the runs be those of packs; camera, time and choices stay where there are some.
     fill(packs) {
-      const factors = this.settings.factors || [];
       const before = this.runs;
-      this.runs = packs.map((pack, k) => new mbsim.Run(pack, factors[k] || { length: 1, time: 1 }));
+      this.runs = packs.map((pack) => new mbsim.Run(pack));
       const first = this.runs[0];
       this.span = [
         Math.min(...this.runs.map((run) => run.start * run.factor.time)),
@@ -130,13 +130,13 @@ mbsim.View = (function () {
         parts.switches.append(label);
       }
       if (!parts.speed.options.length) {
-        const speeds = new Set(SPEEDS);
-        const duration = this.span[1] - this.span[0], unit = about.units.time === "ms" ? 1000 : 1;
-        // slow where a run is short, so that the first look takes some seconds
-        const first = SPEEDS.slice().reverse().find((speed) => duration / unit / speed >= 2.5) || 0.01;
-        this.realTime = unit;
+        this.realTime = about.second;
+        const seconds = (this.span[1] - this.span[0]) / about.second;
+        // by which a run is seen in half a second to some minutes, and real time; slow where it is short
+        const speeds = SPEEDS.filter((speed) => speed === 1 || (seconds / speed > 0.5 && seconds / speed < 400));
+        const first = speeds.slice().reverse().find((speed) => seconds / speed >= 2.5) || speeds[0];
         for (const speed of speeds) { parts.speed.append(new Option(`${speed}×`, speed)); }
-        parts.speed.value = Math.min(1, first);
+        parts.speed.value = seconds > 400 ? first : Math.min(1, first);
       }
       const rows = KEYS.map(([key, what]) => {
         const row = document.createElement("tr"), a = document.createElement("th"), b = document.createElement("td");
