@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import IO, Any, cast, final
+from uuid import uuid4
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
@@ -60,6 +61,7 @@ class Model:
         self, deck: str | PathLike[str] | IO[str] | IO[bytes] | None = None, name: str = ""
     ) -> None:
         self._root = Node("MotionSolve", 0)
+        self._owner = uuid4().hex
         self._sections = {"model": Node("Model", 0), "command": Node("Command", 0)}
         self._bodies: dict[int, Element] = {}
         #: By node: script and line that wrote it.
@@ -85,9 +87,9 @@ class Model:
         for node in self._sections["model"].children:
             number, cg = node.find("id"), node.find("cg_id")
             if node.key in ("bodyrigid", "bodypoint") and number and number.value.isdecimal():
-                marker = Element("Reference_Marker", int(cg.value)) if cg else None
+                marker = self._element("Reference_Marker", int(cg.value)) if cg else None
                 name = BY_KEY[node.key].name
-                self._bodies[int(number.value)] = Element(name, int(number.value), marker)
+                self._bodies[int(number.value)] = self._element(name, int(number.value), marker)
 
     def add(self, statement: str, *values: object, **attributes: Any) -> Element:
         """Add a statement by its name in decks; return the element that it makes.
@@ -108,6 +110,9 @@ class Model:
                 f"{', '.join(must) or 'none'}"
             )
         given = dict(zip(must, values, strict=False)) | attributes
+        for name, value in given.items():
+            if isinstance(value, Element):
+                self._check_own(known.name, name, value)
         own, of_marker = _split(known, given)
         if _CG in known.attributes:
             return self._add_body(known, own, of_marker)
@@ -117,7 +122,15 @@ class Model:
 
     def change(self, element: Element, **attributes: Any) -> None:
         """Change an element in <Command>: from the next Simulate on."""
-        self._write(BY_KEY[fold(element.statement)], {"id": element.id, **attributes}, "command")
+        if not isinstance(element, Element):
+            raise ModelError(f"change: an element of this model; {type(element).__name__} given")
+        self._check_own("change", "element", element)
+        statement = BY_KEY[fold(element.statement)]
+        for name in attributes:
+            if not named(statement, name):
+                known = nearest(name, list(statement.attributes))
+                raise ModelError(f"change: {element.statement} has no attribute {name}{known}")
+        self._write(statement, {"id": element.id, **attributes}, "command")
 
     @property
     def ground(self) -> Element:
@@ -168,7 +181,7 @@ class Model:
             if of_marker:
                 names = ", ".join(of_marker)
                 raise ModelError(f"{statement.name}[{number}]: give {names} to the marker of {_CG}")
-            marker = Element("Reference_Marker", int(written(str(own[_CG]))))
+            marker = self._element("Reference_Marker", int(written(str(own[_CG]))))
             self._write(statement, own)
         else:
             id = self._next_id(REFERENCE_MARKER)
@@ -177,15 +190,25 @@ class Model:
             marker = None
             if of_marker or not shaped:
                 marker = self._write(REFERENCE_MARKER, {"id": id, "body_id": number, **of_marker})
-        self._bodies[number] = body = Element(statement.name, number, marker)
+        self._bodies[number] = body = self._element(statement.name, number, marker)
         return body
+
+    def _element(self, statement: str, id: int, marker: Element | None = None) -> Element:
+        return Element(statement, id, marker, self._owner)
+
+    def _check_own(self, statement: str, name: str, element: Element) -> None:
+        """Raise `ModelError` for an element that another model gave."""
+        if element.owner != self._owner:
+            raise ModelError(
+                f"{statement}: {name}: {element.statement}[{element.id}] is of another mbsim.Model"
+            )
 
     def _marker_of(self, body: Element) -> Element:
         """Return the marker that a body stands for; the ground's is made at first use."""
         known = self._bodies[body.id]
         if known.marker is None:
             marker = self._write(REFERENCE_MARKER, {"body_id": body.id})
-            known = self._bodies[body.id] = Element(body.statement, body.id, marker)
+            known = self._bodies[body.id] = self._element(body.statement, body.id, marker)
         assert known.marker is not None
         return known.marker
 
@@ -237,7 +260,7 @@ class Model:
         self._sections[section].children.append(node)
         self._places[id(node)] = (file, node.line)
         number = node.find("id")
-        return Element(statement.name, int(number.value) if number else 0)
+        return self._element(statement.name, int(number.value) if number else 0)
 
     def _check(self, statement: Statement, node: Node, draft: Draft) -> None:
         """Raise what is wrong with the attributes of one statement, as the reader words it."""

@@ -6,7 +6,7 @@ import inspect
 import keyword
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from mbsim.errors import ModelError
 from mbsim.reader.keywords import fold
@@ -42,6 +42,7 @@ class Element:
     statement: str
     id: int
     marker: Element | None = None
+    owner: str = field(default="", compare=False)  # which model it is of, and copies of that
 
     def __str__(self) -> str:
         return str(self.id)

@@ -45,12 +45,15 @@ def _facts(results: Results) -> dict[str, str]:
     }
 
 
-def _whole(results: Results, names: Sequence[str]) -> list[str]:
-    """Return the signals that names and patterns stand for, each once, without components."""
+def _named(results: Results, names: Sequence[str]) -> list[tuple[str, str]]:
+    """Return what names and patterns stand for, each once: a signal, and the part of it asked for.
+
+    The part of a whole signal is empty.
+    """
     signals = results.signals()
     found = [each for name in names for each in results.find(name)] if names else list(signals)
-    whole = (each if each in signals else each.rpartition("/")[0] for each in found)
-    return [name for name in dict.fromkeys(whole) if name != "time"]
+    parts = ((each, "") if each in signals else each.rpartition("/")[::2] for each in found)
+    return [(name, part) for name, part in dict.fromkeys(parts) if name != "time"]
 
 
 def pandas_frame(results: Results, names: Sequence[str]) -> pandas.DataFrame:
@@ -84,11 +87,13 @@ def _units(results: Results, name: str, count: int) -> str | list[str]:
     return found[0] if len(set(found)) == 1 else found
 
 
-def _variable(package: Any, results: Results, stored: str, ids: list[int], names: list[str]) -> Any:
+def _variable(
+    package: Any, results: Results, group: str, ids: list[int], names: list[str], part: str
+) -> Any:
     """Return one variable: of elements side by side, or of one signal that has no id."""
-    count = results.signals()[names[0]]
-    values = [results[name] for name in names]
-    group = stored.partition("/")[0]
+    columns = results.signals()[names[0]]
+    count = 1 if part else columns
+    values = [results[f"{name}/{part}" if part else name] for name in names]
     dims, coords = ["time"], {"time": results["time"]}
     if ids:
         dims.append(group)
@@ -100,28 +105,34 @@ def _variable(package: Any, results: Results, stored: str, ids: list[int], names
         dims.append(_AXES[count])
         coords[_AXES[count]] = list(PARTS[count])
     array = package.DataArray(np.stack(values, 1) if ids else values[0], coords, dims)
-    quantity = quantity_of(results, names[0])
-    array.attrs = {"units": _units(results, names[0], count), "long_name": quantity.name}
+    column = PARTS.get(columns, {}).get(part, 0)
+    quantity = quantity_of(results, names[0], column)
+    units = _units(results, names[0], count)
+    if part:
+        units = UnitSystem.of(results.attributes).text(quantity)
+    array.attrs = {"units": units, "long_name": quantity.name}
     return array
 
 
 def xarray_dataset(results: Results, names: Sequence[str]) -> xarray.Dataset:
     """Return signals as arrays with coordinates, see `SignalMapping.to_xarray`."""
     package = _need("xarray", "to_xarray")
-    alike: dict[str, tuple[list[int], list[str]]] = {}
-    for name in _whole(results, names):
+    alike: dict[tuple[str, str], tuple[list[int], list[str]]] = {}
+    for name, part in _named(results, names):
         group, _, rest = name.partition("/")
         id, _, last = rest.partition("/")
         beside = last and id.isdecimal()
         stored = f"{group}/{last}" if beside else name
-        ids, same = alike.setdefault(stored, ([], []))
+        ids, same = alike.setdefault((stored, part), ([], []))
         same.append(name)
         if beside:
             ids.append(int(id))
     made = {
         # "/" has no place in a name of netCDF, in which xarray stores
-        stored.replace("/", "_"): _variable(package, results, stored, ids, same)
-        for stored, (ids, same) in alike.items()
+        "_".join(filter(None, (*stored.split("/"), part))): _variable(
+            package, results, stored.partition("/")[0], ids, same, part
+        )
+        for (stored, part), (ids, same) in alike.items()
     }
     dataset: xarray.Dataset = package.Dataset(made, {"time": results["time"]}, _facts(results))
     dataset["time"].attrs["units"] = UnitSystem.of(results.attributes).text(TIME)

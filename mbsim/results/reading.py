@@ -344,7 +344,7 @@ class Results(SignalMapping, WithSensitivities):
         UnknownSignal
             If there is none of this name; the message says what is near and what there is.
         """
-        found = self._find(name)
+        found = self._find(name := str(name))
         if found is None:
             raise UnknownSignal(self._missing(name, self.keys()))
         return self._values(*found)

@@ -20,7 +20,10 @@ if TYPE_CHECKING:
     from mbsim.model.elements import Model
 
 #: Attributes of which digests say whether they matter.
-_SAID_ELSEWHERE = ("tol_from", "model_file", "overrides", "plugins", "interpret_plugins")
+_SAID_ELSEWHERE = (
+    *("tol_from", "model_file", "overrides", "plugins", "interpret_plugins"),
+    "allow_overlap",  # of the start alone
+)
 #: What a digest that differs says, and of which facts of `Identity` it is.
 _DIGESTS = {
     "model_sha256": ("the model file has changed", "model"),

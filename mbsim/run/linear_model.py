@@ -277,8 +277,11 @@ def _read(run: Stepper, y: Array, outputs: tuple[str, ...]) -> Array:
         return np.zeros(0)
     run.method.y[:] = y
     run.changed()
-    found = [float(run.signals[name]) for name in outputs]
-    return np.array(found)
+    found = [run.signals[name] for name in outputs]
+    for name, value in zip(outputs, found, strict=True):
+        if np.size(value) > 1:
+            raise ModelError(f"linearize: {name} has {np.size(value)} numbers: name one of them")
+    return np.array([float(value) for value in found])
 
 
 def _input_step(run: Stepper, row: int) -> float:

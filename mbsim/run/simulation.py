@@ -288,6 +288,8 @@ def _run(model: Model, options: Options) -> Results:
     system, said, attributes, changes = prepare(model, settings, files, *how, tell)
     recorded = (*options.signals, *(["contact_points"] if options.contact_points else []))
     attributes["signals"] = "\n".join(recorded)
+    if options.allow_overlap:
+        attributes["allow_overlap"] = True
     if options.contact_points:
         system.scene = system.scene._replace(rows=with_points(system.scene.rows))
     asked = settings, options.signals, options.bare
@@ -300,7 +302,7 @@ def _run(model: Model, options: Options) -> Results:
         raise
     log = RunLog(system, attributes, recorder.directory, options.resume)
     begin_log(log, system, (*said, *settings.notes, *_advice(model, settings)))
-    status = "failed"
+    status, reason = "failed", ""
     with part("build"):
         runner = Runner(system, settings, recorder, log, tell, changes)
     with _stoppable(runner):
@@ -322,20 +324,21 @@ def _run(model: Model, options: Options) -> Results:
                 runner.storing = True
             status = "finished"
         except Interrupted as error:
-            status = "interrupted"
-            log.line(str(error))
+            status, reason = "interrupted", str(error)
+            log.line(reason)
             raise
         except KeyboardInterrupt:
-            status = "interrupted"
-            log.line(str(stopped := runner.stopped()))
+            status, reason = "interrupted", str(stopped := runner.stopped())
+            log.line(reason)
             raise stopped from None
         except Exception as error:
-            log.line(f"{type(error).__name__}: {error}")
+            reason = str(error)
+            log.line(f"{type(error).__name__}: {reason}")
             raise
         finally:
             runner.storing = True
             compiled = jit.compile_seconds - compiled_before
-            results = _finish(runner, status, time.perf_counter() - began, compiled)
+            results = _finish(runner, status, reason, time.perf_counter() - began, compiled)
     assert results is not None  # a finished run has rows
     return results
 
@@ -386,15 +389,18 @@ def _goes_on(runner: Runner) -> None:
     runner.log.line(line)
 
 
-def _finish(runner: Runner, status: str, wall: float, compiled: float) -> Results | None:
+def _finish(
+    runner: Runner, status: str, reason: str, wall: float, compiled: float
+) -> Results | None:
     """Keep what was recorded, close the log, and return the results, if there are any.
 
-    `wall` and `compiled` are the seconds of the call, and of its compiling.
+    `reason` is why it ended early; `wall` and `compiled` are the seconds of the call, and of its
+    compiling.
     """
     system = runner.system
     with part("storing"):
         runner.recorder.take()
-    stats = runner.stats(wall, compiled)
+    stats = runner.stats(wall, compiled) | ({"reason": reason} if reason else {})
     audit = runner.audit()
     for warning in audit.warnings if audit is not None else ():
         runner.tell(f"warning: {warning}")
@@ -469,7 +475,7 @@ def _attributes(
 def _keep(
     runner: Runner,
     status: str,
-    stats: dict[str, float],
+    stats: Mapping[str, float | str],
     audit: Audit | None,
     close_log: Callable[[], None],
 ) -> Results | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -100,7 +100,7 @@ class Stepper(Runner):
         A sensor may have ended it early. Steps whose sum is the end but for rounding end there.
         """
         now, end = self._numbers[scheme.TIME], self.settings.end_time
-        t = now + dt
+        t = now + float(dt)
         return self.step_to(end if now < end < t + _ROUNDED * dt else t)
 
     def step_to(self, t: float) -> float:
@@ -113,7 +113,7 @@ class Stepper(Runner):
         SolverError, PluginError
             As `simulate` raises them; a `state` from before can be gone back to.
         """
-        now = self._numbers[scheme.TIME]
+        t, now = float(t), self._numbers[scheme.TIME]
         if not t > now or self._closed or self._failed or self.sensing.halted_by:
             return self._no_step(t, now)
         t = self._within(t)
@@ -174,21 +174,23 @@ class Stepper(Runner):
         return self._history.results(folder, status, self.stats(0.0, 0.0), self.audit())
 
     def linearize(
-        self, outputs: Sequence[str] = (), inputs: Sequence[str] | None = None
+        self, outputs: str | Sequence[str] = (), inputs: str | Sequence[str] | None = None
     ) -> LinearModel:
         """Return the model linearised where it is, see `run.linear_model`.
 
         Parameters
         ----------
-        outputs : sequence of str
+        outputs : str or sequence of str
             Signals, ``requests/1/F2``: rows of C and D.
-        inputs : sequence of str, optional
+        inputs : str or sequence of str, optional
             Columns of B and D; default: all inputs.
         """
         from mbsim.run.linear_model import linearize
 
         self._open()
-        return linearize(self, tuple(outputs), tuple(self.inputs if inputs is None else inputs))
+        return linearize(
+            self, _several(outputs), _several(self.inputs if inputs is None else inputs)
+        )
 
     @property
     def end_time(self) -> float:
@@ -352,11 +354,16 @@ class Stepper(Runner):
         return row
 
 
+def _several(names: str | Iterable[str]) -> tuple[str, ...]:
+    """Return names as a tuple; one alone may be given as it is."""
+    return (names,) if isinstance(names, str) else tuple(names)
+
+
 def open_model(
     model: Model | str | PathLike[str] | IO[str] | IO[bytes],
     *,
     overrides: Mapping[str, object] | Sequence[str] = (),
-    inputs: Sequence[str] = (),
+    inputs: str | Sequence[str] = (),
     end_time: float | None = None,
     print_interval: float | None = None,
     integrator: str | None = None,
@@ -395,7 +402,7 @@ def open_model(
     from mbsim.results.log import RunLog
 
     tell = notify or (lambda line: None)
-    given, names = with_inputs(as_model(model, overrides), inputs)
+    given, names = with_inputs(as_model(model, overrides), _several(inputs))
     settings = settle(given, end_time, print_interval, integrator, tol)
     files = [Path(file) for file in plugins]
     made = prepare(given, settings, files, detector, interpret_plugins, scripts, tell)

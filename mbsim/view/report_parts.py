@@ -96,7 +96,8 @@ def warnings(results: Results, told: Sequence[str]) -> str:
     if audit is None:
         lines.insert(0, "The run has not judged itself: it was ended before that.")
     if results.status != "finished":
-        lines.insert(0, f"The run is {results.status}: what is shown ends where it did.")
+        reason = str(results.stats.get("reason", "")).strip()
+        lines.insert(0, f"The run is {results.status}: what is shown ends where it did. {reason}")
     if not lines:
         return '<p class="good">None.</p>'
     return "<ul>" + "".join(f'<li class="warning">{escape(line)}</li>' for line in lines) + "</ul>"
@@ -260,7 +261,8 @@ def versions(results: Results) -> str:
 
 def counters(results: Results) -> str:
     """Return counters and times of the run."""
-    return facts({name.replace("_", " "): value for name, value in results.stats.items()})
+    numbers = {name: value for name, value in results.stats.items() if name != "reason"}
+    return facts({name.replace("_", " "): value for name, value in numbers.items()})
 
 
 def command(results: Results, model: Model | None) -> str:
@@ -277,6 +279,7 @@ def command(results: Results, model: Model | None) -> str:
             words += [option, repr(said.get(name))]
     if said.get("detector") == "fcl":
         words += ["--detector", "fcl"]
-    if said.get("interpret_plugins"):
-        words.append("--interpret-plugins")
+    for option in ("interpret_plugins", "allow_overlap"):
+        if said.get(option):
+            words.append("--" + option.replace("_", "-"))
     return shlex.join(words)

@@ -210,6 +210,13 @@ def test_a_mesh_is_written_from_arrays():
         (lambda m: m.joint("REVOLUTE", 1, 2, pos=(0, 0, 0)), ModelError, "give bodies"),
         (lambda m: (m.body(id=3, mass=1), m.body(id=3, mass=1)), DeckError, "already used"),
         (lambda m: m.Force_Contact, AttributeError, "Force_Contact is .contact"),
+        (lambda m: m.change(m.ground, foo=1), ModelError, "Body_Rigid has no attribute foo"),
+        (lambda m: m.change(3, mass=1), ModelError, "an element of this model; int given"),
+        (
+            lambda m: m.joint("FIXED", mbsim.Model().ground, m.ground),
+            ModelError,
+            "Body_Rigid[1] is of another mbsim.Model",
+        ),
         (lambda m: m.contcat, AttributeError, "did you mean contact?"),
     ],
 )

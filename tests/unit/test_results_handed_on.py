@@ -94,7 +94,13 @@ def test_xarray(results):
     assert units == ["m"] * 4 + ["rad"] * 4
     np.testing.assert_array_equal(dataset["time"], results["time"])
     assert dataset["time"].attrs["units"] == "s"
-    assert list(results.to_xarray("bodies/2/velocity/mag").data_vars) == ["bodies_velocity"]
+    parts = results.to_xarray("bodies/2/velocity/mag", "requests/7/F5")
+    assert list(parts.data_vars) == ["bodies_velocity_mag", "requests_7_F5"]
+    np.testing.assert_array_equal(
+        parts["bodies_velocity_mag"].sel(bodies=2), results["bodies/2/velocity/mag"]
+    )
+    assert parts["bodies_velocity_mag"].attrs["units"] == "m/s"
+    assert parts["requests_7_F5"].attrs["units"] == "rad"
 
 
 @pytest.mark.parametrize(("package", "method"), [("pandas", "to_pandas"), ("xarray", "to_xarray")])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from helpers.decks import GRAVITY, GROUND, contact, sphere, write_deck
 from helpers.views import HOSTILE, run_balls
 from mbsim.cli.main import main
 from mbsim.results.reading import open_results
@@ -59,6 +60,19 @@ def test_what_has_changed_is_not_quoted(tmp_path):
         text = report(results)
     assert "has changed since the run" in text
     assert "another --" not in text
+
+
+def test_the_report_of_a_run_that_failed_says_why(tmp_path):
+    (tmp_path / "law.py").write_text(
+        "def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):\n"
+        "    raise ValueError('no such surface')\n"
+    )
+    law = contact(script_name="law.py", cff_type="USERCFF", cff_fnc_name="CFFSUB")
+    deck = write_deck(tmp_path, GROUND + sphere(0.2, v=(0.5, 0, 0)) + law + GRAVITY)
+    done = CliRunner().invoke(main, ["run", str(deck), "-o", str(tmp_path), "--report"])
+    assert done.exit_code == 4
+    (made,) = tmp_path.glob("*-report.html")
+    assert "ValueError: no such surface" in made.read_text(encoding="utf-8").replace("&#x27;", "'")
 
 
 def test_run_writes_it(tmp_path):
