@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
@@ -35,6 +36,9 @@ Given: TypeAlias = "str | PathLike[str] | IO[str] | IO[bytes] | Builder"
 
 #: What a deck is called that is no file; the files that it names are looked for from here.
 _NO_FILE = "deck.xml"
+#: What may stand before the first element of a deck that is given as text.
+_BEFORE_XML = "\ufeff \t\r\n"
+_DECLARATION = re.compile(r"\A\ufeff?\s*<\?xml\b[^>]*\?>|\A\ufeff")
 
 
 def as_model(
@@ -188,8 +192,10 @@ def _fill(data: bytes, draft: Draft, overrides: Sequence[str]) -> None:
 
 def _given(path: Given) -> tuple[str | PathLike[str], bytes]:
     """Return what a deck is called, and its bytes."""
-    if isinstance(path, str) and path.lstrip().startswith("<"):
-        return _NO_FILE, path.encode("utf-8")
+    if path == "":
+        raise ModelError("an empty text is neither a path nor XML")
+    if isinstance(path, str) and path.lstrip(_BEFORE_XML).startswith("<"):
+        return _NO_FILE, _encoded(path)
     if isinstance(path, (str, PathLike)):
         file = cast("str | PathLike[str]", path)
         return file, _read_bytes(Path(file))
@@ -199,7 +205,22 @@ def _given(path: Given) -> tuple[str | PathLike[str], bytes]:
     data = read()
     named = getattr(path, "name", None)
     name = named if isinstance(named, str) else _NO_FILE
-    return name, data.encode("utf-8") if isinstance(data, str) else data
+    return name, _encoded(data) if isinstance(data, str) else data
+
+
+def _encoded(text: str) -> bytes:
+    """Return a deck's text as UTF-8, without the declaration, which says how bytes are to be read.
+
+    Lines keep their numbers.
+    """
+    text = _DECLARATION.sub(lambda found: "\n" * found[0].count("\n"), text)
+    try:
+        return text.encode("utf-8")
+    except UnicodeEncodeError as error:
+        line = text.count("\n", 0, error.start) + 1
+        raise ModelError(
+            f"{_NO_FILE}:{line}: a character that is no text: {text[error.start]!r}"
+        ) from None
 
 
 def _read_bytes(path: Path) -> bytes:

@@ -187,6 +187,25 @@ def test_with_a_density_the_shapes_give_the_centre_of_mass():
     assert read.graphics[1].shape == "BOX"
 
 
+@pytest.mark.parametrize(
+    "before", ["", "\ufeff", "\n  ", "\n<?xml version='1.0'?>", '\ufeff<?xml encoding="utf-16"?>\n']
+)
+def test_a_text_is_read_whatever_stands_before_it(before):
+    model = mbsim.Model()
+    model.body(mass=1, inertia=(1, 1, 1), label="Kugel \u00e4")
+    model.simulate(end_time=1, print_interval=0.1)
+    assert "Kugel \u00e4" in [
+        b.label for b in mbsim.read_model(before + model.to_xml()).bodies.values()
+    ]
+
+
+def test_a_text_that_is_none_is_refused():
+    with pytest.raises(ModelError, match="an empty text is neither a path nor XML"):
+        mbsim.read_model("")
+    with pytest.raises(ModelError, match=r"deck.xml:3: a character that is no text: '\\ud800'"):
+        mbsim.read_model("<MotionSolve>\n\n<!-- \ud800 --></MotionSolve>")
+
+
 def test_a_mesh_is_written_from_arrays():
     model = mbsim.Model()
     body = model.body(density=1.0)

@@ -87,6 +87,8 @@ def _first_words(error: Exception) -> str:
     plain = re.sub(r"\x1b\[[0-9;]*m", "", str(error))
     if "built-in function len" in plain:
         return "what it returns is no list of numbers"
+    if "unify" in plain and "return type" in plain:
+        return "branches return different kinds, as a list and a tuple: let all return a list"
     lines = [line.strip(" -") for line in plain.splitlines()]
     telling = [line for line in lines if line and not line.startswith(("Failed in", "During:"))]
     return f"{type(error).__name__}: {telling[0] if telling else ''}"[:200]

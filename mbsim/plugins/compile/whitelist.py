@@ -430,14 +430,17 @@ class _Check:
         if kind == "function":
             self.callees.append(name)
             return
-        raise refuse(node, f"calls {name}{instead_of(name)}")
+        raise refuse(node, f"calls {name}{instead_of(name, kind)}")
 
 
-def instead_of(name: str) -> str:
-    """Return what compiles in place of a call, ``; hypot(x, y) compiles``, or nothing."""
-    owner, _, last = name.rpartition(".")
+def instead_of(name: str, kind: str) -> str:
+    """Return what compiles in place of a call, ``; hypot(x, y) compiles``, or nothing.
+
+    `kind` is that of `callee`: NumPy's `tanh` may be called by that name alone.
+    """
+    last = name.rpartition(".")[2]
     if last in MATH_PLAIN or last in MATH_CHECKED:
-        return f"; {last} of math compiles" if owner else ""
+        return f"; {last} of math compiles" if kind == "other" else ""
     return f"; {INSTEAD[last]} compiles" if last in INSTEAD else ""
 
 
