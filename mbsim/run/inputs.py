@@ -54,11 +54,18 @@ def _holding(model: Model) -> dict[int, str]:
 def _names(model: Model) -> dict[str, tuple[str, int]]:
     """Return the elements that may be inputs, by path and, where it is the only one, by label."""
     found = {f"{table}/{id}": (table, id) for table in _TABLES for id in model.table(table)}
-    labels: dict[str, list[tuple[str, int]]] = {}
-    for element in found.values():
-        label = model.table(element[0])[element[1]].label
-        labels.setdefault(label, []).append(element)
-    return found | {label: e[0] for label, e in labels.items() if label and len(e) == 1}
+    labels = {label: paths[0] for label, paths in _labels(model).items() if len(paths) == 1}
+    return found | {label: found[path] for label, path in labels.items()}
+
+
+def _labels(model: Model) -> dict[str, list[str]]:
+    """Return the paths of the elements that may be inputs, by label."""
+    labels: dict[str, list[str]] = {}
+    for table in _TABLES:
+        for id, element in model.table(table).items():
+            if element.label:
+                labels.setdefault(element.label, []).append(f"{table}/{id}")
+    return labels
 
 
 def _named(model: Model, name: str, holding: Mapping[int, str]) -> tuple[str, int]:
@@ -67,6 +74,8 @@ def _named(model: Model, name: str, holding: Mapping[int, str]) -> tuple[str, in
     if name not in known:
         near = nearest(name, known)
         hint = f"; did you mean {' or '.join(near)}?" if near else f"; there is {', '.join(known)}"
+        alike = _labels(model).get(name)
+        hint = f"; {' and '.join(alike)} have this label" if alike else hint
         raise ModelError(f"inputs: no variable and no motion {name!r}{hint}")
     table, id = known[name]
     element = model.table(table)[id]
@@ -118,7 +127,7 @@ class Inputs(MutableMapping[str, float]):
     def __init__(
         self, model: Model, scene: Scene, names: Mapping[str, int], changed: Callable[[int], None]
     ) -> None:
-        self._rows, self._changed = names, changed
+        self._rows, self._changed, self._labels = names, changed, _labels(model)
         self._count = len(model.inputs)
         self._shown = {k: name for name, k in names.items()}  # the label, where there is one
         self.look_at(scene)
@@ -185,9 +194,11 @@ class Inputs(MutableMapping[str, float]):
         if name in self._rows:
             return self._rows[name]
         near = nearest(name, self._rows)
-        hint = f"did you mean {' or '.join(near)}" if near else f"there is {', '.join(self)}"
+        hint = f"did you mean {' or '.join(near)}?" if near else f"there is {', '.join(self)}."
+        if len(alike := self._labels.get(name, ())) > 1:
+            hint = f"{' and '.join(alike)} have this label."
         raise ModelError(
-            f"no input {name!r}; {hint}? A variable whose expression is no number, and a motion, "
+            f"no input {name!r}; {hint} A variable whose expression is no number, and a motion, "
             "is one where mbsim.open(..., inputs=[...]) names it"
         )
 

@@ -215,6 +215,15 @@ def test_signals_are_those_of_the_result_file():
             sim.signals["bodies/2/position/w"]
 
 
+def test_a_label_of_two_inputs_is_told_their_paths():
+    deck = pushed().replace('label="spring"', 'label="push"')
+    with mbsim.open(deck) as sim:
+        with pytest.raises(ModelError, match="variables/5 and variables/6 have this label"):
+            sim.inputs["push"] = 1.0
+    with pytest.raises(ModelError, match="variables/5 and variables/6 have this label"):
+        mbsim.open(deck, inputs="push")
+
+
 def test_a_label_in_place_of_an_id_is_told_its_id():
     deck = pushed().replace('id="2" cg_id', 'id="2" label="Slider" cg_id')
     deck = deck.replace('Constraint_Joint id="1"', 'Constraint_Joint id="1" label="rail"')
