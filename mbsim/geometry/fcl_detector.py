@@ -221,7 +221,7 @@ class FclDetector:
         depth, n = least_overlap(hull, solid)
         row[AT_DEPTH], row[AT_WEIGHT], row[COUPLE:] = max(depth, -0.0), 1.0, 0.0
         if depth > 0.0:
-            row[AT_POINT:AT_NORMAL] = p + R @ touching_point(hull, solid, depth, n)
+            row[AT_POINT:AT_NORMAL] = p + R @ touching_point(solid, depth, n)
             row[AT_NORMAL:AT_WEIGHT] = -(R @ n) if turned else R @ n
         return True
 

@@ -3,36 +3,33 @@
 With n out of the mesh, far_M(n) the mesh's farthest vertex and far_S(-n) the solid's point that is
 lowest along n, the overlap f(n) = n . (far_M(n) - far_S(-n)) is least, over all n,
 
-* at the normal of a face of the mesh or of an end disc of the solid,
-* on the arc between the normals of two faces, against the round of the solid at their edge,
-* on the circle of the normals of a solid of revolution's side, against a vertex or an edge,
-* or between a vertex and an ellipsoid.
+* at the normal of a face of the mesh,
+* on the arc between the normals of two faces, against the solid at their edge,
+* or between a vertex and the solid.
 
-On arcs and circles f' changes sign there: smoothly, or with a jump where both meet, which has a
-closed form. Where some f < 0 the shapes are apart; how far is not asked. Force n at the points that
-meet is minus the slope of f: the elastic energy depends on the pose alone.
+A solid of revolution is crowned (`geometry.crowned`): it has one lowest point in every direction.
+On arcs f' changes sign there. Where some f < 0 the shapes are apart; how far is not asked. Force n
+at the points that meet is minus the slope of f: the elastic energy depends on the pose alone.
 """
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from mbsim.geometry.support import round_normal, support
+from mbsim.geometry.convex import ROTOR, Shape
+from mbsim.geometry.crowned import CROWN, outside, ways_out
+from mbsim.geometry.support import round_normal
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-#: Places on an arc and on a circle between which f' is looked at, and rounds to where it is 0.
-_ARC, _CIRCLE, _ROUNDS = 4, 25, 20
+#: Places on an arc between which f' is looked at, and rounds to where it is 0.
+_ARC, _ROUNDS = 4, 100
+#: Part of the solid's size that points which meet may be beside each other, along n.
+_NO_LEVER = 2e-12
 #: Faces whose normals differ less are one flat side.
 _FLAT = 1e-9
-#: Vertices are as high as each other within this part of the solid's size.
-_TIE = 1e-9
-#: A support point that a tilt by this moves by more than `_WIDE` of the solid's size is part of
-#: a line or a disc; from a third of that on it begins to be one.
-_TILT, _WIDE = 2e-3, 0.15
 
 
 class Hull(NamedTuple):
@@ -83,14 +80,17 @@ def _lowest(solid: Solid, n: Array) -> Array:
         scaled = local * size
         found = size * scaled / np.linalg.norm(scaled, axis=1)[:, None]
     else:
+        # the point of the profile that is nearest to one far outside
         bottom, top, half = _revolved(solid)
-        radial = np.hypot(local[:, 0], local[:, 1])
-        upper = top * radial + half * local[:, 2] >= bottom * radial - half * local[:, 2]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            rim = np.where(radial > 0.0, np.where(upper, top, bottom) / radial, 0.0)
-        found = np.column_stack([
-            rim * local[:, 0], rim * local[:, 1], np.where(upper, half, -half)
-        ])  # fmt: skip
+        R, radial = solid.size.max() / CROWN, np.hypot(local[:, 0], local[:, 1])
+        x, z = R * radial, R * local[:, 2]
+        dx, dz = top - bottom, 2.0 * half
+        part = np.clip(((x - bottom) * dx + (z + half) * dz) / (dx * dx + dz * dz), 0.0, 1.0)
+        above, below = (z > half) & (x < top), (z < -half) & (x < bottom)
+        r = np.where(above | below, x, bottom + part * dx)
+        h = np.where(above, half, np.where(below, -half, part * dz - half))
+        r = r / np.maximum(radial, 1e-300)
+        found = np.column_stack([r * local[:, 0], r * local[:, 1], h])
     return np.asarray(solid.centre + found @ solid.axes.T)
 
 
@@ -100,25 +100,41 @@ def _revolved(solid: Solid) -> tuple[float, float, float]:
     return (a, b, c) if solid.shape == "FRUSTUM" else (a, a, b)
 
 
+def _as_shape(solid: Solid) -> Shape:
+    """Return a solid of revolution as compiled code takes it."""
+    x, y, z = (tuple(axis) for axis in solid.axes.T.tolist())
+    return ROTOR, tuple(solid.centre.tolist()), x, y, z, _revolved(solid)
+
+
+def _beyond(solid: Solid, points: Array) -> Array:
+    """Return how far the solid's surface, as it is taken here, is outside of points of its own."""
+    if solid.shape == "ELLIPSOID":
+        return np.zeros(len(points))
+    bottom, top, half = _revolved(solid)
+    square = max(bottom, top) ** 2 + half**2 - ((points - solid.centre) ** 2).sum(axis=1)
+    return np.asarray(square * (0.5 * CROWN / solid.size.max()))
+
+
 def _overlaps(hull: Hull, solid: Solid, n: Array) -> Array:
     """Return f of each n."""
-    high = (n @ hull.vertices.T).max(axis=1)
-    return np.asarray(high - (n * _lowest(solid, n)).sum(axis=1))
+    high, low = (n @ hull.vertices.T).max(axis=1), _lowest(solid, n)
+    return np.asarray(high - (n * low).sum(axis=1) + _beyond(solid, low))
 
 
-def _valleys(way: Any, slope: Any, places: Array) -> Array:
+def _valleys(way: Any, slope: Any, places: Array, close: float) -> Array:
     """Return the directions where f' goes from below 0 to above it, shape (k, 3).
 
     ``way(row, x)`` is the direction at place x of an arc or circle, ``slope(row, x)`` is f'
-    there; places has shape (rows, k).
+    there, 0 where it is less than `close`; places has shape (rows, k).
     """
     rows = np.repeat(np.arange(len(places)), places.shape[1])
     s = slope(rows, places.ravel()).reshape(places.shape)
     row, k = np.nonzero((s[:, :-1] < 0.0) & (s[:, 1:] >= 0.0))
     low, high, f, g = places[row, k], places[row, k + 1], s[row, k], s[row, k + 1]
-    x, side = low, np.zeros(len(row))
+    x, side, halve = low, np.zeros(len(row)), np.zeros(len(row), dtype=bool)
     for _ in range(_ROUNDS if len(row) else 0):
-        x = (low * g - high * f) / (g - f)
+        width = high - low
+        x = np.where(halve, 0.5 * (low + high), (low * g - high * f) / (g - f))
         h = slope(row, x)
         down = h < 0.0
         # Illinois rule: an end that stays twice has half its weight
@@ -126,7 +142,9 @@ def _valleys(way: Any, slope: Any, places: Array) -> Array:
         f = np.where(down, h, np.where(side > 0.0, 0.5 * f, f))
         low, high = np.where(down, x, low), np.where(down, high, x)
         side = np.where(down, -1.0, 1.0)
-        if (np.minimum(np.abs(h), high - low) < 1e-16).all():
+        # where that did not halve the rest, the middle comes next
+        halve = high - low > 0.5 * width
+        if ((np.abs(h) < close) | (high - low < 4e-16)).all():
             break
     return np.asarray(way(row, x))
 
@@ -147,45 +165,20 @@ def _at_edges(hull: Hull, solid: Solid) -> Array:
         turn = np.cos(x)[:, None] * across[k] - np.sin(x)[:, None] * first[k]
         return np.asarray((turn * (hull.edges[k] - _lowest(solid, way(k, x)))).sum(axis=1))
 
-    return _valleys(way, slope, np.linspace(0.0, 1.0, _ARC) * angle[:, None])
+    places = np.linspace(0.0, 1.0, _ARC) * angle[:, None]
+    return _valleys(way, slope, places, _NO_LEVER * float(solid.size.max()))
 
 
-def _meetings(hull: Hull, solid: Solid) -> Array:
-    """Return the directions normal to an edge and to a solid of revolution's side.
-
-    There f' jumps. m = p e + q a +- w (e x a) with m.e = 0 and m.a given.
-    """
-    bottom, top, half = _revolved(solid)
-    along = (top - bottom) / math.hypot(bottom - top, 2.0 * half)
-    a = solid.axes[:, 2]
-    e = np.cross(hull.beside[:, 0], hull.beside[:, 1])
-    e /= np.linalg.norm(e, axis=1)[:, None]
-    both = e @ a
-    square = 1.0 - both * both
-    good = (square > 1e-12) & (along * along < square)
-    e, both, square = e[good], both[good], square[good]
-    base = (along / square)[:, None] * (a - both[:, None] * e)
-    w = np.sqrt((1.0 - along * along / square) / square)
-    across = w[:, None] * np.cross(e, a)
-    return np.vstack([base + across, base - across])
-
-
-def _at_side(hull: Hull, solid: Solid) -> Array:
-    """Return the directions of least overlap on the circle of the side's normals."""
-    bottom, top, half = _revolved(solid)
-    slant = math.hypot(bottom - top, 2.0 * half)
-    along, across = (bottom - top) / slant, 2.0 * half / slant
-    u, v, a = solid.axes.T
-
-    def way(_: Any, x: Array) -> Array:
-        return np.asarray(-along * a - across * (np.outer(np.cos(x), u) + np.outer(np.sin(x), v)))
-
-    def slope(_: Any, x: Array) -> Array:
-        turn = across * (np.outer(np.sin(x), u) - np.outer(np.cos(x), v))
-        top_most = hull.vertices[np.argmax(way(_, x) @ hull.vertices.T, axis=1)]
-        return np.asarray((turn * (top_most - solid.centre)).sum(axis=1))
-
-    return _valleys(way, slope, np.linspace(0.0, 2.0 * np.pi, _CIRCLE)[None, :])
+def _at_rotor(hull: Hull, solid: Solid) -> Array:
+    """Return the directions of vertices inside a solid of revolution, and the nearest outside."""
+    shape = _as_shape(solid)
+    corners = [tuple(p) for p in hull.vertices.tolist()]
+    heights = np.array([outside(shape, p) for p in corners])
+    wanted = np.flatnonzero(heights <= 0.0).tolist()
+    if (heights > 0.0).any():
+        wanted.append(int(np.argmin(np.where(heights > 0.0, heights, np.inf))))
+    found = [ways_out(shape, corners[k], way) for k in wanted for way in range(3)]
+    return np.array([n for known, _, n in found if known]).reshape(-1, 3)
 
 
 def _apart_at_vertex(hull: Hull, solid: Solid) -> Array:
@@ -231,79 +224,14 @@ def least_overlap(hull: Hull, solid: Solid) -> tuple[float, Array]:
     if solid.shape == "ELLIPSOID":
         more.append(_at_vertices(hull, solid, n[k]))
     else:
-        more += [_meetings(hull, solid), _at_side(hull, solid)]
+        more.append(_at_rotor(hull, solid))
     n = np.vstack(more)
     f = _overlaps(hull, solid, n)
     k = int(np.argmin(f))
     return float(f[k]), n[k]
 
 
-def _mean(points: Array, weights: Array) -> Array:
-    return np.asarray(weights @ points / weights.sum())
-
-
-def _crossing(edge: Array, solid: Solid, n: Array) -> Array | None:
-    """Return where the solid's side line that is down along n crosses an edge (2, 3), seen along n.
-
-    None where an end is down, or the two are parallel.
-    """
-    if solid.shape == "ELLIPSOID":
-        return None
-    a = solid.axes[:, 2]
-    bottom, top, half = _revolved(solid)
-    w = -n - ((-n) @ a) * a
-    length = float(np.linalg.norm(w))
-    if length < 0.1:
-        return None
-    w /= length
-    low = solid.centre - half * a + bottom * w
-    way = 2.0 * half * a + (top - bottom) * w
-    across = np.cross(edge[1] - edge[0], n)
-    rise = float(way @ across)
-    if abs(rise) < 1e-6 * float(np.linalg.norm(way) * np.linalg.norm(across)):
-        return None
-    return np.asarray(low + min(1.0, max(0.0, float((edge[0] - low) @ across) / rise)) * way)
-
-
-def touching_point(hull: Hull, solid: Solid, f: float, n: Array) -> Array:
-    """Return the middle of the points that meet along n.
-
-    One of both shapes touches with a point there, but for lines and flat sides on each other: then
-    the middle of what they have in common, by how deep it is.
-    """
-    low = support(solid.shape, solid.size, solid.centre, solid.axes, -n)
-    t = np.array([1.0, 0.0, 0.0]) if abs(n[0]) < 0.7 else np.array([0.0, 1.0, 0.0])
-    t -= (t @ n) * n
-    t /= np.linalg.norm(t)
-    s = np.cross(n, t)
-    angles = np.arange(8) * 0.25 * np.pi
-    around = n + _TILT * (np.outer(np.cos(angles), t) + np.outer(np.sin(angles), s))
-    lows = _lowest(solid, around / np.linalg.norm(around, axis=1)[:, None])
-    wide = np.linalg.norm(lows - low, axis=1).max() / solid.size.max()
-    # 1 where the solid has one lowest point, 0 where a line or a disc is down
-    pointed = 1.0 - min(1.0, max(0.0, (wide - _WIDE / 3.0) / (_WIDE - _WIDE / 3.0)))
-    if pointed == 1.0:
-        return np.asarray(low + 0.5 * f * n)
-    along = hull.vertices @ n
-    ties = hull.vertices[along >= along.max() - _TIE * solid.size.max()]
-    crossing = _crossing(ties, solid, n) if len(ties) == 2 else None
-    if crossing is not None:
-        return np.asarray(crossing + 0.5 * f * n)
-    weight = np.maximum(0.0, along - along.max() + 0.5 * f)
-    high = hull.vertices[weight > 0.0]
-    weight = weight[weight > 0.0]
-    if len(high) == 1:
-        common = high[0]
-    else:
-        # of the lowest points those that lie over the mesh's side, and of its corners those under
-        # the solid: a coarse middle of both
-        heights = lows @ n
-        lows = lows[heights <= heights.min() + 0.5 * f]
-        axes = np.column_stack([t, s])
-        a, b = high @ axes, lows @ axes
-        first = np.maximum(a.min(axis=0), b.min(axis=0))
-        last = np.minimum(a.max(axis=0), b.max(axis=0))
-        common = axes @ (0.5 * (first + last)) + n * float(_mean(high, weight) @ n)
-    level = float(low @ n) + 0.5 * f
-    both = pointed * low + (1.0 - pointed) * common
-    return np.asarray(both + n * (level - float(both @ n)))
+def touching_point(solid: Solid, f: float, n: Array) -> Array:
+    """Return the middle of the points that meet along n."""
+    low = _lowest(solid, n[None, :])
+    return np.asarray(low[0] + (0.5 * f - _beyond(solid, low)[0]) * n)

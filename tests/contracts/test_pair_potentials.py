@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from helpers.pairs import candidates, frame, random_rotation, turned
+from helpers.pairs import SIZES, candidates, frame, random_rotation, turned
 from helpers.polyhedra import PLANE, Shape, box, box_mesh, mesh, points_of
 from mbsim.geometry.catalog import COUPLE, PAIRS
 
@@ -73,17 +73,17 @@ def pressed(rows_of, depth, rng):
         return frame(aside + low * way, R), frame_j
 
 
-def off(rows_of, frame_i, frame_j):
+def off(rows_of, frame_i, frame_j, step=STEP):
     """Return how far force and torque are from the slope of the energy, over their size."""
     rows = rows_of(frame_i, frame_j)
     scale = np.array([1.0, 1.0, 1.0, LEVER, LEVER, LEVER])
     wrench = felt(rows, frame_i[:3])
     slope = [
-        energy(rows_of(moved(frame_i, k, STEP), frame_j))
-        - energy(rows_of(moved(frame_i, k, -STEP), frame_j))
+        energy(rows_of(moved(frame_i, k, step), frame_j))
+        - energy(rows_of(moved(frame_i, k, -step), frame_j))
         for k in range(6)
     ]
-    error = (wrench + np.array(slope) / (2.0 * STEP)) / scale
+    error = (wrench + np.array(slope) / (2.0 * step)) / scale
     return np.abs(error).max() / np.abs(wrench / scale).max()
 
 
@@ -201,8 +201,37 @@ def test_round_solids_on_convex_meshes(shape, swapped):
     rng = np.random.default_rng(4)
     rows_of = rotor_on_hull(shape, swapped, rng)
     errors = [off(rows_of, *pressed(rows_of, depth, rng)) for depth in (1e-3, 1e-2) * 4]
-    # lines and flat sides that lie on each other have a point of their own
+    # two ways out may be as short
     assert np.quantile(errors, 0.7) < 1e-7
+
+
+#: How solids lie on a box of half height 0.2 whose top is flat: which way up, how high their centre
+#: is, how far it may be off the middle and still lie.
+FLAT = {
+    "CYLINDER stands": ("CYLINDER", np.eye(3), 0.4, 0.5),
+    "CYLINDER lies": ("CYLINDER", turned([0, 1, 0], 0.5 * np.pi), 0.25, 0.65),
+    "FRUSTUM stands": ("FRUSTUM", np.eye(3), 0.35, 0.5),
+    "FRUSTUM hangs": ("FRUSTUM", turned([1, 0, 0], np.pi), 0.35, 0.4),
+}
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1e-5, 1e-4, 1e-3])
+@pytest.mark.parametrize("pose", FLAT)
+def test_flat_on_flat(pose, tilt):
+    """An end or a straight side on a face, over its edges or not, presses where the depth grows."""
+    shape, R, height, reach = FLAT[pose]
+    rng, errors = np.random.default_rng(8), []
+    i, j = Shape(shape, np.append(SIZES[shape], 0.0)), mesh(*box_mesh(np.array([0.3, 0.3, 0.2])))
+    for _ in range(20):
+        aside = rng.uniform(-reach, reach, 2)
+        lean = turned([*rng.normal(size=2), 0.0], tilt) @ turned([0, 0, 1], rng.uniform(0.0, 6.0))
+        frames = (frame([*aside, 0.2 + height - 1e-3], lean @ R), frame(np.zeros(3), np.eye(3)))
+        if energy(points_of(i, frames[0], j, frames[1])) > 0.0:
+            # the point goes from rim to rim within some 1e-4
+            errors.append(off(lambda a, b: points_of(i, a, j, b), *frames, step=3e-8))
+    assert len(errors) > 9
+    # a rim may pass an edge within a step
+    assert np.quantile(errors, 0.85) < 1e-6
 
 
 @pytest.mark.parametrize("shape", ["CYLINDER", "FRUSTUM", "CONE", "ELLIPSOID"])

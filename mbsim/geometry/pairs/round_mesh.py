@@ -3,28 +3,27 @@
 All is in the mesh's axes. With n out of the mesh, far_M(n) its farthest corner and far_S(-n) the
 solid's point that is lowest along n, the overlap f(n) = n . (far_M(n) - far_S(-n)) is least
 
-* at the normal of a face of the mesh or of an end disc of the solid,
+* at the normal of a face of the mesh,
 * on the arc between the normals of two faces, where far_M is any point of their edge,
-* on the circle of the normals of a solid of revolution's side, against a corner,
-* or between a corner and an ellipsoid.
+* or between a corner and the solid.
 
-On an arc f' changes sign there, smoothly or with a jump where an edge meets the straight side,
-which has a closed form. The force at the points that meet is the slope of f: the elastic energy
-depends on the pose alone.
+A solid of revolution is crowned here (`geometry.crowned`), so it has one lowest point in every
+direction, as an ellipsoid has: on an arc f' changes sign smoothly, and the point moves smoothly
+from rim to rim where a flat end or a straight side lies. The force there is the slope of f: the
+elastic energy depends on the pose alone.
 """
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
-from mbsim.core.rotation import add, any_tangent, cross, dot, norm, scale, sub, vector
+from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.geometry.catalog import axis, pair, put_point
-from mbsim.geometry.convex import BOX, ELLIPSOID, ROTOR, Shape, between_round, far, slant
+from mbsim.geometry.convex import BOX, ELLIPSOID, ROTOR, Shape, between_round, far
+from mbsim.geometry.crowned import bulge, far_crowned, outside, ways_out
 from mbsim.geometry.mesh.merging import to_local
 from mbsim.geometry.pairs.revolution import cylinder_size
 from mbsim.geometry.polyhedron import corner, plane, to_global
@@ -39,17 +38,15 @@ from mbsim.model.hull import (
     FACES,
 )
 
-#: Parts of an arc, and of a circle, between which f' is looked at; rounds to where it is 0.
-ARC, CIRCLE, ROUNDS = 3, 24, 20
+#: Parts of an arc between which f' is looked at; rounds to where it is 0.
+ARC, ROUNDS = 3, 100
+#: Part of the solid's size that points which meet may be beside each other, along n: no lever arm.
+#: An angle's rounding moves the point of a crowned solid by 1e-12 of its size.
+NO_LEVER = 2e-12
 #: Faces whose normals differ less are one flat side.
 FLAT = 1e-9
 #: Part of the solid's least size up to which a face that it lies over is the way out.
 SHALLOW = 0.05
-#: Corners are as high as each other within this part of the solid's size.
-TIE = 1e-9
-#: A lowest point that a tilt by this moves by more than `WIDE` of the solid's size is part of a
-#: line or a disc; from a third of that on it begins to be one.
-TILT, WIDE = 2e-3, 0.15
 
 Way = tuple[float, V3]
 
@@ -57,7 +54,14 @@ Way = tuple[float, V3]
 @jitable
 def lowest(solid: Shape, n: V3) -> V3:
     """Return the point of the solid that is lowest along n."""
-    return far(solid, scale(-1.0, n))
+    down = scale(-1.0, n)
+    return far_crowned(solid, down) if solid[0] == ROTOR else far(solid, down)
+
+
+@jitable
+def beyond(solid: Shape, p: V3) -> float:
+    """Return how far the solid's surface, as it is taken here, is outside of its point p."""
+    return bulge(solid, p) if solid[0] == ROTOR else 0.0
 
 
 @jitable
@@ -74,7 +78,8 @@ def high_corner(hull: F1, n: V3) -> V3:
 @jitable
 def better(solid: Shape, p: V3, n: V3, best: Way) -> Way:
     """Return the better of what is known and direction n, along which p is the mesh's highest."""
-    f = dot(n, sub(p, lowest(solid, n)))
+    low = lowest(solid, n)
+    f = dot(n, sub(p, low)) + beyond(solid, low)
     return (f, n) if f < best[0] else best
 
 
@@ -84,7 +89,8 @@ def least_face(hull: F1, solid: Shape) -> tuple[float, V3, int]:
     least, found, at = math.inf, 0, int(hull[AT_PLANES])
     for face in range(int(hull[FACES])):
         m = vector(hull, at + 4 * face)
-        f = hull[at + 4 * face + 3] - dot(m, lowest(solid, m))
+        low = lowest(solid, m)
+        f = hull[at + 4 * face + 3] - dot(m, low) + beyond(solid, low)
         if f < least:
             least, found = f, face
     return least, plane(hull, found), found
@@ -122,19 +128,22 @@ def along_arc(solid: Shape, p: V3, n0: V3, n1: V3, best: Way) -> Way:
     sine = norm(across)
     if sine < FLAT:
         return best
-    across, width = scale(1.0 / sine, across), math.atan2(sine, cosine) / ARC
+    across, part = scale(1.0 / sine, across), math.atan2(sine, cosine) / ARC
     low, _ = arc_slope(solid, p, n0, across, 0.0)
+    close = NO_LEVER * max(solid[5][0], max(solid[5][1], solid[5][2]))
     for k in range(ARC):
-        a, fa = k * width, low
-        b = a + width
+        a, fa = k * part, low
+        b = a + part
         fb, n = arc_slope(solid, p, n0, across, b)
         low = fb
         if not (fa < 0.0 and fb >= 0.0):
             continue
-        side = 0
+        side, halve = 0, False
         for _ in range(ROUNDS):
-            # Illinois rule: an end that stays twice has half its weight
-            x = (a * fb - b * fa) / (fb - fa)
+            # Illinois rule: an end that stays twice has half its weight. Where that did not halve
+            # the rest, as at a flat side that f' passes all at once, the middle comes next
+            width = b - a
+            x = 0.5 * (a + b) if halve else (a * fb - b * fa) / (fb - fa)
             slope, n = arc_slope(solid, p, n0, across, x)
             if slope < 0.0:
                 a, fa, fb = x, slope, 0.5 * fb if side < 0 else fb
@@ -142,75 +151,36 @@ def along_arc(solid: Shape, p: V3, n0: V3, n1: V3, best: Way) -> Way:
             else:
                 b, fb, fa = x, slope, 0.5 * fa if side > 0 else fa
                 side = 1
-            if min(abs(slope), b - a) < 1e-16:
+            if abs(slope) < close or b - a < 4e-16:
                 break
+            halve = b - a > 0.5 * width
         best = better(solid, p, n, best)
     return best
 
 
 @jitable
-def at_meetings(solid: Shape, p: V3, n0: V3, n1: V3, best: Way) -> Way:
-    """Return the better of what is known and the normals that an edge and a straight side share.
+def at_rotor(hull: F1, solid: Shape, best: Way) -> Way:
+    """Return the better of what is known and the least overlap of a crowned solid with corners.
 
-    n = base +- w (e x a) with n.e = 0 and n.a that of the side, a the solid's axis, e the edge.
+    Of the corners outside the nearest one alone may part the shapes.
     """
-    around, a, gamma = cross(n0, n1), solid[4], -slant(solid[5])
-    size = norm(around)
-    if size < FLAT:
-        return best
-    e = scale(1.0 / size, around)
-    both = dot(e, a)
-    square = 1.0 - both * both
-    if square < 1e-12 or gamma * gamma >= square:
-        return best
-    base = scale(gamma / square, sub(a, scale(both, e)))
-    w = scale(math.sqrt((1.0 - gamma * gamma / square) / square), cross(e, a))
-    for k in range(2):
-        n = add(base, w) if k == 0 else sub(base, w)
-        # on the arc
-        if dot(cross(n, n1), around) >= 0.0 and dot(cross(n0, n), around) >= 0.0:
-            best = better(solid, p, n, best)
-    return best
-
-
-@jitable
-def side_slope(hull: F1, solid: Shape, x: float) -> tuple[float, V3, V3]:
-    """Return f' at an angle of the circle of the side's normals, the direction, the corner."""
-    gamma = slant(solid[5])
-    k = math.sqrt(1.0 - gamma * gamma)
-    c, s = math.cos(x), math.sin(x)
-    out = add(scale(c, solid[2]), scale(s, solid[3]))
-    n = scale(-1.0, add(scale(gamma, solid[4]), scale(k, out)))
-    turn = scale(k, sub(scale(s, solid[2]), scale(c, solid[3])))
-    p = high_corner(hull, n)
-    return dot(turn, sub(p, solid[1])), n, p
-
-
-@jitable
-def along_side(hull: F1, solid: Shape, best: Way) -> Way:
-    """Return the better of what is known and the least f on the circle of the side's normals."""
-    low, n, p = side_slope(hull, solid, 0.0)
-    width = 2.0 * math.pi / CIRCLE
-    for k in range(CIRCLE):
-        a, fa = k * width, low
-        b = a + width
-        fb, n, p = side_slope(hull, solid, b)
-        low = fb
-        if not (fa < 0.0 and fb >= 0.0):
-            continue
-        side = 0
-        for _ in range(ROUNDS):
-            x = (a * fb - b * fa) / (fb - fa)
-            slope, n, p = side_slope(hull, solid, x)
-            if slope < 0.0:
-                a, fa, fb = x, slope, 0.5 * fb if side < 0 else fb
-                side = -1
-            else:
-                b, fb, fa = x, slope, 0.5 * fa if side > 0 else fa
-                side = 1
-            if min(abs(slope), b - a) < 1e-16:
-                break
-        best = better(solid, p, n, best)
+    nearest, least = -1, math.inf
+    for k in range(int(hull[CORNERS])):
+        p = corner(hull, k)
+        height = outside(solid, p)
+        if height <= 0.0:
+            for way in range(3):
+                found, depth, n = ways_out(solid, p, way)
+                if found and depth < best[0]:
+                    best = better(solid, high_corner(hull, n), n, best)
+        elif height < least:
+            nearest, least = k, height
+    if nearest >= 0:
+        p = corner(hull, nearest)
+        for way in range(3):
+            found, _, n = ways_out(solid, p, way)
+            if found:
+                best = better(solid, high_corner(hull, n), n, best)
     return best
 
 
@@ -266,6 +236,7 @@ def least_overlap(hull: F1, solid: Shape) -> Way:
         for k in range(2):
             m = scale(1.0 - 2.0 * k, solid[4])
             best = better(solid, high_corner(hull, m), m, best)
+        best = at_rotor(hull, solid, best)
     else:
         best = at_corners(hull, solid, best)
     if best[0] < 0.0:
@@ -275,113 +246,7 @@ def least_overlap(hull: F1, solid: Shape) -> Way:
         p = corner(hull, hull[at + 4 * k])
         n0, n1 = plane(hull, hull[at + 4 * k + 2]), plane(hull, hull[at + 4 * k + 3])
         best = along_arc(solid, p, n0, n1, best)
-        if solid[0] == ROTOR:
-            best = at_meetings(solid, p, n0, n1, best)
-    if solid[0] == ROTOR and best[0] >= 0.0:
-        best = along_side(hull, solid, best)
     return best
-
-
-@jitable
-def tilted(n: V3, t: V3, s: V3, k: int) -> V3:
-    """Return n tilted to the k-th of eight sides."""
-    angle = 0.25 * math.pi * k
-    n = add(n, add(scale(TILT * math.cos(angle), t), scale(TILT * math.sin(angle), s)))
-    return scale(1.0 / norm(n), n)
-
-
-@jitable
-def crossing(solid: Shape, p: V3, q: V3, n: V3) -> tuple[bool, V3]:
-    """Return (found, where the side's line that is down along n crosses edge p-q, seen along n).
-
-    Not found where an end is down, or the two are parallel.
-    """
-    a, (bottom, top, half) = solid[4], solid[5]
-    w = sub(scale(dot(n, a), a), n)
-    length = norm(w)
-    if solid[0] != ROTOR or length < 0.1:
-        return False, p
-    w = scale(1.0 / length, w)
-    low = add(solid[1], sub(scale(bottom, w), scale(half, a)))
-    way = add(scale(2.0 * half, a), scale(top - bottom, w))
-    across = cross(sub(q, p), n)
-    rise = dot(way, across)
-    if abs(rise) < 1e-6 * norm(way) * norm(across):
-        return False, p
-    part = min(1.0, max(0.0, dot(sub(p, low), across) / rise))
-    return True, add(low, scale(part, way))
-
-
-@jitable
-def common_middle(
-    hull: F1, solid: Shape, f: float, n: V3, t: V3, s: V3, top: float
-) -> tuple[V3, bool]:
-    """Return the middle of what lies on each other along n, and whether it is where lines cross.
-
-    `top` is the height of the mesh's highest corner, t and s are square to n. Of the solid's lowest
-    points those count that lie over the mesh's side, of its corners those under the solid.
-    """
-    size = max(solid[5][0], max(solid[5][1], solid[5][2]))
-    box = np.array([[math.inf, -math.inf], [math.inf, -math.inf]])
-    ends, ties, many, heights, weights = (top, top, top), 0, 0, 0.0, 0.0
-    p, q = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    for k in range(int(hull[CORNERS])):
-        x = corner(hull, k)
-        height = dot(x, n)
-        if height >= top - TIE * size:
-            ties += 1
-            p, q = q, x
-        weight = height - top + 0.5 * f
-        if weight > 0.0:
-            many, weights, heights = many + 1, weights + weight, heights + weight * height
-            ends = x
-            for c in range(2):
-                along = dot(x, t if c == 0 else s)
-                box[c, 0], box[c, 1] = min(box[c, 0], along), max(box[c, 1], along)
-    if ties == 2:
-        found, place = crossing(solid, p, q, n)
-        if found:
-            return place, True
-    if many == 1:
-        return ends, False
-    least = math.inf
-    for k in range(8):
-        least = min(least, dot(lowest(solid, tilted(n, t, s, k)), n))
-    low = np.array([[math.inf, -math.inf], [math.inf, -math.inf]])
-    for k in range(8):
-        x = lowest(solid, tilted(n, t, s, k))
-        if dot(x, n) > least + 0.5 * f:
-            continue
-        for c in range(2):
-            along = dot(x, t if c == 0 else s)
-            low[c, 0], low[c, 1] = min(low[c, 0], along), max(low[c, 1], along)
-    u = 0.5 * (max(box[0, 0], low[0, 0]) + min(box[0, 1], low[0, 1]))
-    v = 0.5 * (max(box[1, 0], low[1, 0]) + min(box[1, 1], low[1, 1]))
-    return add(scale(heights / weights, n), add(scale(u, t), scale(v, s))), False
-
-
-@jitable
-def touching_point(hull: F1, solid: Shape, f: float, n: V3) -> V3:
-    """Return the middle of the points that meet along n.
-
-    One of both shapes touches with a point there, but for lines and flat sides on each other: then
-    the middle of what they have in common, by how deep it is.
-    """
-    low, t = lowest(solid, n), any_tangent(n)
-    s = cross(n, t)
-    wide, size = 0.0, max(solid[5][0], max(solid[5][1], solid[5][2]))
-    for k in range(8):
-        wide = max(wide, norm(sub(lowest(solid, tilted(n, t, s, k)), low)) / size)
-    # 1 where the solid has one lowest point, 0 where a line or a disc is down
-    pointed = 1.0 - min(1.0, max(0.0, (wide - WIDE / 3.0) / (WIDE - WIDE / 3.0)))
-    if pointed == 1.0:
-        return add(low, scale(0.5 * f, n))
-    top = dot(high_corner(hull, n), n)
-    common, crossed = common_middle(hull, solid, f, n, t, s, top)
-    if crossed:
-        return add(common, scale(0.5 * f, n))
-    both = add(scale(pointed, low), scale(1.0 - pointed, common))
-    return add(both, scale(dot(low, n) + 0.5 * f - dot(both, n), n))
 
 
 @jitable
@@ -392,7 +257,9 @@ def round_on_hull(kind: int, frame_i: F1, size: V3, frame_j: F1, size_j: F1, poi
     x, y, z = axis(frame_i, 0), axis(frame_i, 1), axis(frame_i, 2)
     solid = (kind, centre, to_local(frame_j, x), to_local(frame_j, y), to_local(frame_j, z), size)
     f, n = least_overlap(hull, solid)
-    p = touching_point(hull, solid, f, n) if f > 0.0 else lowest(solid, n)
+    p = lowest(solid, n)
+    if f > 0.0:
+        p = add(p, scale(0.5 * f - beyond(solid, p), n))
     p = add(vector(frame_j), to_global(frame_j, p))
     put_point(points[0], f, p, to_global(frame_j, n))
     return 1
