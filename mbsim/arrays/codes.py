@@ -307,6 +307,9 @@ AT_POINTS, AROUND_RIM, AT_PLACES = range(3)
 #: that sticks is held along J, a plane; they are none; or they are, but what sticks is held along
 #: J's face, at a place that has another row behind an edge.
 AT_ROWS, ON_PLANE, NO_ROWS, HELD_AT_PLACES = range(4)
+#: `Graphics.flat`: flat sides are across the shape's axes, as far out as `size`, or there are none;
+#: or they are those of the polyhedron that `size` is the address of.
+AXIS_SIDES, HULL_SIDES = range(2)
 STRETCH = 2
 # columns of `Rows.contact`, of each contact; force and torque take three
 CONTACT_FORCE, CONTACT_TORQUE, CONTACT_DEPTH, CONTACT_SLIP = 0, 3, 6, 7

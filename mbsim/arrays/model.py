@@ -31,6 +31,7 @@ class Graphics(NamedTuple):
     thin: F1  # (ng,) half of the thinnest side, of meshes also of their walls; inf for a plane
     width: F1  # (ng,) half of the least width of the whole shape; inf for a plane
     shape: I1  # (ng,) class of shape, see `Broadphase.kind`
+    flat: I1  # (ng,) how its flat sides are known: AXIS_SIDES or HULL_SIDES
     marker_p: F2  # (ng, 3) reference marker, in cg axes
     marker_R: F3  # (ng, 3, 3)
     surfaces: F1  # packed triangles of shapes that need them (`model.surface`), see `size`

@@ -15,7 +15,9 @@ from mbsim.arrays.codes import (
     AT_PLACES,
     AT_POINTS,
     AT_ROWS,
+    AXIS_SIDES,
     HELD_AT_PLACES,
+    HULL_SIDES,
     NO_ROWS,
     ON_PLANE,
     STRETCH,
@@ -124,6 +126,7 @@ def graphics_table(
         thin=np.zeros(n),
         width=np.zeros(n),
         shape=np.zeros(n, dtype=np.int64),
+        flat=np.full(n, AXIS_SIDES, dtype=np.int64),
         marker_p=np.zeros((n, 3)),
         marker_R=np.zeros((n, 3, 3)),
         surfaces=surfaces,
@@ -145,14 +148,22 @@ def graphics_table(
         made.half[g] = half_extent(graphic)
         made.turns[g] = 0 if graphic.shape == "SPHERE" else 1
         made.shape[g] = shapes.index(shape_class(graphic))
+        if graphic.hull is not None:
+            made.flat[g] = HULL_SIDES
         made.marker_p[g] = marker.p_B
         made.marker_R[g] = marker.R_B
     return made
 
 
-#: Pairs whose points lie in a face of J: corners of a flat shape on a plane, and those whose corner
-#: has another row behind an edge of the other shape.
-HELD_ALONG = {"BOX-PLANE": ON_PLANE, "BOX-BOX": HELD_AT_PLACES}
+#: Pairs whose points lie in a face: corners of a flat shape on a plane, and those whose corner has
+#: another row behind an edge of the other shape.
+HELD_ALONG = {
+    "BOX-PLANE": ON_PLANE,
+    "MESH-PLANE": ON_PLANE,
+    "BOX-BOX": HELD_AT_PLACES,
+    "MESH-BOX": HELD_AT_PLACES,
+    "MESH-MESH": HELD_AT_PLACES,
+}
 
 
 def _face_weight(kind: Kind) -> float:

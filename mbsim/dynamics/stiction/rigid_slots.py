@@ -23,7 +23,7 @@ from mbsim.dynamics.constraints.selection import sticks
 from mbsim.dynamics.contact.forces import contact_of, sides, velocity_at
 from mbsim.dynamics.contact.frames import tangent
 from mbsim.dynamics.contact.points import pass_on
-from mbsim.dynamics.stiction.faces import above, as_normal, face_of, has_face
+from mbsim.dynamics.stiction.faces import Face, face_of, has_face, onto
 from mbsim.dynamics.stiction.rigid_shares import first_of_slots
 from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT
 
@@ -109,27 +109,24 @@ def look_around(scene: Scene, y: F1, pair: int, moment: float) -> None:
 
 
 @jitable
-def fill_in_face(scene: Scene, t: float, y: F1, s: int) -> None:
+def fill_in_face(scene: Scene, t: float, y: F1, s: int, face: Face) -> None:
     """Bring the row of `Work.sticking_point` of slot s into the face that its pair is held along.
 
     One that has no place any more keeps the one that it had.
     """
-    row, pair = scene.work.sticking_point[s], scene.slots.pair[s]
-    points, gj = scene.work.look[LOOKED_NOW], scene.pairs.graphic_j[pair]
-    b = scene.graphics.body[gj]
-    out, height = face_of(scene, pair, points, 0)
-    n, turns = as_normal(scene, pair, out), (0.0, 0.0, 0.0)
+    row, pair, points = scene.work.sticking_point[s], scene.slots.pair[s], scene.work.look
+    g, n, _ = face
+    b, turns = scene.graphics.body[g], (0.0, 0.0, 0.0)
     p, rate = vector(row[HELD_POINT:]), vector(row[POINT_RATE:])
-    if points[s - scene.pairs.slot[pair], AT_DEPTH] == 0.0:
+    if points[LOOKED_NOW, s - scene.pairs.slot[pair], AT_DEPTH] == 0.0:
         p = vector(scene.state.p[s])
         rate = velocity_at(scene, y, b, p)
     if b < len(scene.bodies.mass):
         turns = vector(scene.work.w[b])
-    z = above(scene, pair, p, out, height)
-    q = sub(p, scale(z, out))
+    q = onto(face, p)
     # it stays in the face, which moves
-    rate = sub(rate, scale(z, cross(turns, out)))
-    rate = sub(rate, scale(dot(sub(rate, velocity_at(scene, y, b, q)), out), out))
+    rate = sub(rate, scale(dot(sub(p, q), n), cross(turns, n)))
+    rate = sub(rate, scale(dot(sub(rate, velocity_at(scene, y, b, q)), n), n))
     dn, gi, other = cross(turns, n), sides(scene, s)[0], sides(scene, s)[1]
     bi, bj = scene.graphics.body[gi], scene.graphics.body[other]
     x = tangent(scene, t, y, s, contact_of(scene, s), gi, bi, bj, n)
@@ -163,8 +160,10 @@ def fill_hold(scene: Scene, t: float, y: F1, s: int, moment: float) -> None:
             points[last, k, AT_NORMAL + i] - points[first, k, AT_NORMAL + i]
         ) / time
     if has_face(scene, scene.slots.pair[s]):
-        fill_in_face(scene, t, y, s)
-        return
+        face = face_of(scene, scene.slots.pair[s], points[LOOKED_NOW], 0)
+        if face[0] >= 0:
+            fill_in_face(scene, t, y, s, face)
+            return
     gi, gj = sides(scene, s)
     bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
     x = tangent(scene, t, y, s, contact_of(scene, s), gi, bi, bj, vector(now[AT_NORMAL:]))
