@@ -7,10 +7,14 @@ that normal forces go from rounding to the weight, box by box.
 from __future__ import annotations
 
 import math
+import re
 
+import numpy as np
 import pytest
+import trimesh
 
 from helpers.decks import contact, run_deck
+from helpers.surfaces import mesh_graphic
 
 G = 9.81
 
@@ -71,6 +75,38 @@ CASES = [
     # the row of another corner became a corner, and that was held at the middle of the box
     ("AUTO", 1e-3, (5, 0.1, 0.5, 0.261), (243100.0, 1.5, 3.635, 0.769), 0.14, 350),
 ]
+
+
+def of_meshes(text, which):
+    """Return a deck in which boxes, by where they are in the stack, are meshes of the same size."""
+    for k in which:
+        id = k + 2
+        found = re.search(
+            rf'<Post_Graphic id="{id}00" type="Box\w+" center_marker_id="(\d+)"\s+length_x="([^"]+)"'
+            r"[^>]*/>",
+            text,
+        )
+        cube = trimesh.creation.box((float(found[2]),) * 3)
+        made = mesh_graphic(100 * id, int(found[1]), cube.vertices, cube.faces)
+        text = text.replace(found[0], made)
+    return text
+
+
+#: Which are meshes; the rest are boxes.
+MESHES = [(2, (0, 1)), (2, (0,)), (2, (1,)), (3, (0, 2))]
+
+
+@pytest.mark.parametrize(("count", "which"), MESHES)
+def test_a_stack_of_meshes_is_one_of_boxes(count, which, tmp_path):
+    """With little damping their corners rock for long."""
+    boxes = stack(count, 0.2, 1.0, 0.1, **rigid(1e6, 1.0, 2.0, 0.5))
+    ends = []
+    for text in (boxes, of_meshes(boxes, which)):
+        results = run_deck(tmp_path, text, 0.03, 0.01, integrator="AUTO", tol=1e-4)
+        assert results["time"][-1] == pytest.approx(0.03)
+        assert results.stats["steps"] < 150 * count
+        ends.append(np.array([results[f"bodies/{k + 2}/position"][-1] for k in range(count)]))
+    np.testing.assert_allclose(ends[1], ends[0], rtol=0, atol=2e-6)
 
 
 @pytest.mark.parametrize(("method", "tol", "boxes", "law", "end", "steps"), CASES)

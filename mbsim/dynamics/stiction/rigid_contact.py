@@ -369,6 +369,9 @@ def record_sticking(scene: Scene, t: float, y: F1) -> None:
             kept[KEPT_X] = rest(scene) + settled(scene)
             continue
         if holds_nothing(scene, s):
+            if before[KEPT_MODE] == STICK:
+                # it will tell where it is held again
+                record_event(scene, t, SLIP_EVENT, s)
             state.mode[s] = kept[KEPT_MODE]
             continue
         if kept[KEPT_MODE] == SLIP and kept[KEPT_SPEED] == 0.0:
