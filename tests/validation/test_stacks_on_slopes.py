@@ -82,8 +82,8 @@ def of_meshes(text, which):
     for k in which:
         id = k + 2
         found = re.search(
-            rf'<Post_Graphic id="{id}00" type="Box\w+" center_marker_id="(\d+)"\s+length_x="([^"]+)"'
-            r"[^>]*/>",
+            rf'<Post_Graphic id="{id}00" type="Box\w+" center_marker_id="(\d+)"\s+'
+            r'length_x="([^"]+)"[^>]*/>',
             text,
         )
         cube = trimesh.creation.box((float(found[2]),) * 3)
