@@ -6,10 +6,10 @@ crowned, as rollers are: of its points y the one counts in a direction d that is
 
     d . (y - c) + (s - |y - c|^2) / 2 R
 
-with c its centre, s = |y - c|^2 of its farthest rim and R = size / `CROWN`. That is the point which
-is nearest to c + R d. In a plane through the axis each line has become an arc of radius R: the
-farthest rim is where it was, the middle of an end of radius r is out by r^2 / 2 R. A turn by
-`CROWN` moves the point by about the size of the solid.
+with c the point of the axis from which both rims are as far, s the square of that distance, and R
+the size over `CROWN`. That is the point which is nearest to c + R d. In a plane through the axis
+each line has become an arc of radius R: rims are where they were, the middle of an end of radius r
+is out by r^2 / 2 R. A turn by `CROWN` moves the point by about the size of the solid.
 """
 
 from __future__ import annotations
@@ -27,14 +27,18 @@ CROWN = 1e-4
 ROUNDS = 3
 
 #: A straight part of the profile: a point of it, its direction, its length, its outward normal; in
-#: coordinates away from the axis and along it, from the centre.
+#: coordinates away from the axis and along it, from c.
 Line = tuple[V2, V2, float, V2]
 
 
 @jitable
-def arc_radius(size: V3) -> float:
-    """Return the radius of what bulges [L]."""
-    return max(size[0], max(size[1], size[2])) / CROWN
+def arcs(size: V3) -> V3:
+    """Return how far along the axis c is, the radius R of what bulges, and s [L, L, L^2]."""
+    bottom, top, half = size
+    at = (top - bottom) * (top + bottom) / (4.0 * half)
+    # a frustum that is flat has c far away
+    radius = max(max(half, abs(at)), max(bottom, top)) / CROWN
+    return at, radius, bottom * bottom + (half + at) ** 2
 
 
 @jitable
@@ -56,8 +60,8 @@ def far_crowned(solid: Shape, d: V3) -> V3:
     """Return the point of the solid that is farthest in the unit direction d, as it is crowned."""
     _, centre, x, y, z, size = solid
     a, b = dot(d, x), dot(d, y)
-    t, R = math.sqrt(a * a + b * b), arc_radius(size)
-    r, h = nearest_of_profile(size, R * t, R * dot(d, z))
+    t, (at, R, _) = math.sqrt(a * a + b * b), arcs(size)
+    r, h = nearest_of_profile(size, R * t, at + R * dot(d, z))
     r = r / t if t > 1e-300 else 0.0
     return add(centre, add(scale(r * a, x), add(scale(r * b, y), scale(h, z))))
 
@@ -65,29 +69,30 @@ def far_crowned(solid: Shape, d: V3) -> V3:
 @jitable
 def bulge(solid: Shape, p: V3) -> float:
     """Return how far the crowned surface is outside of a point p of the solid's own."""
-    bottom, top, half = solid[5]
-    rim, d = max(bottom, top), sub(p, solid[1])
-    return (rim * rim + half * half - dot(d, d)) / (2.0 * arc_radius(solid[5]))
+    at, radius, square = arcs(solid[5])
+    d = sub(p, add(solid[1], scale(at, solid[4])))
+    return (square - dot(d, d)) / (2.0 * radius)
 
 
 @jitable
 def line_of(size: V3, k: int) -> Line:
-    """Return a part of the profile: 0 the bottom end, 1 the top end, else the side."""
+    """Return a part of the profile, from c: 0 the bottom end, 1 the top end, else the side."""
     bottom, top, half = size
+    at = arcs(size)[0]
     if k == 0:
-        return (0.0, -half), (1.0, 0.0), bottom, (0.0, -1.0)
+        return (0.0, -half - at), (1.0, 0.0), bottom, (0.0, -1.0)
     if k == 1:
-        return (0.0, half), (1.0, 0.0), top, (0.0, 1.0)
+        return (0.0, half - at), (1.0, 0.0), top, (0.0, 1.0)
     dx, dz = top - bottom, 2.0 * half
     length = math.sqrt(dx * dx + dz * dz)
     dx, dz = dx / length, dz / length
-    return (bottom, -half), (dx, dz), length, (dz, -dx)
+    return (bottom, -half - at), (dx, dz), length, (dz, -dx)
 
 
 @jitable
 def in_profile(solid: Shape, p: V3) -> tuple[float, float, V3]:
-    """Return a point's distance from the axis, its height from the centre, and the way outward."""
-    d = sub(p, solid[1])
+    """Return a point's distance from the axis, how far along it it is from c, the way outward."""
+    d = sub(p, add(solid[1], scale(arcs(solid[5])[0], solid[4])))
     z = dot(d, solid[4])
     across = sub(d, scale(z, solid[4]))
     x = norm(across)
@@ -102,21 +107,20 @@ def outside(solid: Shape, p: V3) -> float:
     for k in range(3):
         (x0, z0), _, _, (nx, nz) = line_of(solid[5], k)
         height = max(height, (x - x0) * nx + (z - z0) * nz)
-    return height - bulge(solid, solid[1])
+    _, radius, square = arcs(solid[5])
+    return height - square / (2.0 * radius)
 
 
 @jitable
 def ways_out(solid: Shape, p: V3, k: int) -> tuple[bool, float, V3]:
     """Return (found, depth, unit way inward) of point p under a part of the solid (`line_of`).
 
-    With a, b the point along a line and outward from it, both from the centre, u its arc's normal
-    there and t the depth: a = u_a (R - t), b = the line's own height + bulge - ...; so u follows
-    from t, and t from u.
+    With a, b the point along a line and outward from it, both from c, the arc's normal over y has
+    the slope y / R; so y follows from the depth t, and t from y.
     """
     x, z, out = in_profile(solid, p)
-    bottom, top, half = solid[5]
     (x0, z0), (dx, dz), length, (nx, nz) = line_of(solid[5], k)
-    R, rim = arc_radius(solid[5]), max(bottom, top)
+    _, R, square = arcs(solid[5])
     start, height = x0 * dx + z0 * dz, x0 * nx + z0 * nz
     a, b, t, y, slope = x * dx + z * dz, x * nx + z * nz, 0.0, 0.0, 0.0
     for _ in range(ROUNDS):
@@ -124,7 +128,7 @@ def ways_out(solid: Shape, p: V3, k: int) -> tuple[bool, float, V3]:
         slope = y / R
         # from p along the normal to the line, and on to the arc
         t = (height - b) / math.sqrt(1.0 - slope * slope)
-    t += (rim * rim + half * half - y * y - height * height) / (2.0 * R)
+    t += (square - y * y - height * height) / (2.0 * R)
     found = start <= y <= start + length
     up = math.sqrt(1.0 - slope * slope)
     wx, wz = slope * dx + up * nx, slope * dz + up * nz

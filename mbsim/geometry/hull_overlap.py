@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbsim.geometry.convex import ROTOR, Shape
-from mbsim.geometry.crowned import CROWN, outside, ways_out
+from mbsim.geometry.crowned import arcs, outside, ways_out
 from mbsim.geometry.support import round_normal
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -82,8 +82,8 @@ def _lowest(solid: Solid, n: Array) -> Array:
     else:
         # the point of the profile that is nearest to one far outside
         bottom, top, half = _revolved(solid)
-        R, radial = solid.size.max() / CROWN, np.hypot(local[:, 0], local[:, 1])
-        x, z = R * radial, R * local[:, 2]
+        (at, R, _), radial = arcs((bottom, top, half)), np.hypot(local[:, 0], local[:, 1])
+        x, z = R * radial, at + R * local[:, 2]
         dx, dz = top - bottom, 2.0 * half
         part = np.clip(((x - bottom) * dx + (z + half) * dz) / (dx * dx + dz * dz), 0.0, 1.0)
         above, below = (z > half) & (x < top), (z < -half) & (x < bottom)
@@ -110,9 +110,9 @@ def _beyond(solid: Solid, points: Array) -> Array:
     """Return how far the solid's surface, as it is taken here, is outside of points of its own."""
     if solid.shape == "ELLIPSOID":
         return np.zeros(len(points))
-    bottom, top, half = _revolved(solid)
-    square = max(bottom, top) ** 2 + half**2 - ((points - solid.centre) ** 2).sum(axis=1)
-    return np.asarray(square * (0.5 * CROWN / solid.size.max()))
+    at, radius, square = arcs(_revolved(solid))
+    away = points - (solid.centre + at * solid.axes[:, 2])
+    return np.asarray((square - (away * away).sum(axis=1)) / (2.0 * radius))
 
 
 def _overlaps(hull: Hull, solid: Solid, n: Array) -> Array:
