@@ -157,7 +157,7 @@ def flung(shape, swapped, rng):
 @pytest.mark.parametrize("swapped", [False, True])
 @pytest.mark.parametrize("shape", GRAPHICS)
 def test_a_hit_keeps_its_energy_as_far_as_tol_says(shape, swapped, tmp_path):
-    rng = np.random.default_rng(6)
+    rng = np.random.default_rng(2)
     for k in range(3):
         deck = tmp_path / f"{k}.xml"
         deck.write_text(flung(shape, swapped, rng))
