@@ -176,6 +176,9 @@ WORK_NOW, WORK_THEN, TOUCHED_NOW = range(3)
 
 # entries of `Audit.plan`: steps from one sample to the next, tol, a time at which one is taken
 AUDIT_EVERY, AUDIT_TOL, AUDIT_UNTIL = range(3)
+# entries of `Awake.count`; columns of `Awake.rest`, behind the mass the centre
+AWAKE_BODIES, AWAKE_GRAPHICS = range(2)
+REST_MASS, REST_CENTRE, REST_SPREAD = 0, 1, 4
 
 # entries of `Audit.tally`: local error of the step tried last, as the norm gave it; steps, and sum
 # of their errors, since the last sample and in all; incidents and contact at the last sample, and
@@ -297,7 +300,7 @@ EVENT_TIME, EVENT_KIND, EVENT_ELEMENT, EVENT_SLOT = range(4)
 #: Rows of `Sweep.cone`: those of stiction.cones, and three of stiction.rigid_contact.
 CONE_ROWS = 12
 SLOT_COLUMNS = 32
-#: What `contact_set.put_aside` keeps of a slot, and twice the memory: frames, mode, point,
+#: What `contact.memory.put_aside` keeps of a slot, and twice the memory: frames, mode, point,
 #: `Work.slot`.
 SPARE = 24 + SLOT_COLUMNS
 #: How a friction law is asked on a rim (`contact.rims`): at its points, all round it, at a place

@@ -41,7 +41,7 @@ from mbsim.arrays.model import (
     World,
 )
 from mbsim.arrays.scratch import Rows, Sweep, Work
-from mbsim.arrays.state import Audit, Broadphase, Log, Pairs, State
+from mbsim.arrays.state import Audit, Awake, Broadphase, Log, Pairs, State
 
 
 class Scene(NamedTuple):
@@ -69,6 +69,7 @@ class Scene(NamedTuple):
     world: World
     scales: Scales
     state: State
+    awake: Awake
     log: Log
     audit: Audit
     work: Work

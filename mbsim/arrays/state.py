@@ -90,6 +90,21 @@ class State(NamedTuple):
     # another mode since the committed state; of all: how many changed it: see events.switching
 
 
+@tags.scratch
+class Awake(NamedTuple):
+    """What a step goes through where bodies sleep (`stepping.awake`); else it is everything."""
+
+    # (2,) LISTED, or else it is everything; how many rows of `part`: the running method's own
+    whole: tags.State[I1]
+    part: I2  # (nb + 1, 2) begin and end of numbers of y that do not belong to what sleeps
+    count: I1  # type: ignore[assignment]  # (2,) bodies and graphics
+    body: I1  # (nb,) that do not sleep, ascending
+    graphic: I1  # (ng,) theirs
+    loadable: tags.Constant[I1]  # bodies on which applied forces may act, asleep or not
+    rest: F2  # (groups, 5) of what sleeps: mass, its centre, sum of masses times way from there
+    potential: F1  # (1,) energy of what sleeps
+
+
 @tags.state
 class Log(NamedTuple):
     """What is counted and watched over all steps."""

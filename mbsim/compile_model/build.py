@@ -28,7 +28,7 @@ from mbsim.compile_model.markers import MarkerTable, body_rows
 from mbsim.compile_model.mechanism import sweep
 from mbsim.compile_model.pairing import Plans, plan_pairs
 from mbsim.compile_model.rigid_slots import rigid_slots
-from mbsim.compile_model.scratch import Sizes, empty_log, empty_rows, scratch, start_state
+from mbsim.compile_model.scratch import Sizes, awake, empty_log, empty_rows, scratch, start_state
 from mbsim.compile_model.switching import has_modes, sticking
 from mbsim.compile_model.user_code import UserCode, load_user_code, no_residuals, users_table
 from mbsim.core.collection import no_collection
@@ -274,6 +274,15 @@ def _group_scales(groups: Groups) -> Scales:
     )
 
 
+def _loadable(acts: Acting, body: np.ndarray[Any, Any], bodies: int) -> np.ndarray[Any, Any]:
+    """Return the moving bodies on which applied forces may act, weight over time included."""
+    if np.any(np.asarray(acts.pulls[0].program) >= 0):
+        return np.arange(bodies)
+    ends = np.concatenate([acts.applied.i, acts.applied.j]).astype(np.int64)
+    found = np.unique(body[ends[ends >= 0]])
+    return found[found < bodies].astype(np.int64)
+
+
 def _programs(model: Model, acts: Acting, contact_ids: list[int]) -> Programs:
     """Return the programs of all expressions."""
     made = acts.programs.arrays(acts.mechanism.elements, acts.applied_ids, contact_ids)
@@ -338,6 +347,7 @@ def _scene(
         world=_world(acts, judged, accumulators),
         scales=_group_scales(judged.groups),
         state=start_state(n, contacts.graphics, table.start_angles(), residuals),
+        awake=awake(n, contacts.graphics, _loadable(acts, markers.body, n.bodies)),
         log=empty_log(n.contacts),
         audit=audit(
             contacts.listed,

@@ -10,7 +10,8 @@ import numpy as np
 from mbsim.arrays import codes
 from mbsim.arrays.model import Graphics, Residuals
 from mbsim.arrays.scratch import Rows, Work
-from mbsim.arrays.state import Log, State
+from mbsim.arrays.state import Awake, Log, State
+from mbsim.core.problem import WHOLE
 from mbsim.geometry.catalog import POINT
 from mbsim.geometry.motion import MOTION
 from mbsim.laws import abi
@@ -82,6 +83,21 @@ def start_state(
         residual=np.full((len(residuals.id), 2, len(residuals.given)), np.nan),
         fastest=np.zeros(n.groups),
         chattering=np.zeros(4),
+    )
+
+
+def awake(n: Sizes, graphics: Graphics, loadable: np.ndarray[Any, Any]) -> Awake:
+    """Return what a step goes through before anything sleeps: everything."""
+    nb, ng = n.bodies, len(graphics.body)
+    return Awake(
+        whole=np.array([WHOLE, 0]),
+        part=np.zeros((nb + 1, 2), dtype=np.int64),
+        count=np.zeros(2, dtype=np.int64),
+        body=np.zeros(nb, dtype=np.int64),
+        graphic=np.zeros(ng, dtype=np.int64),
+        loadable=loadable,
+        rest=np.zeros((n.groups, 5)),
+        potential=np.zeros(1),
     )
 
 

@@ -31,6 +31,7 @@ from mbsim.core.problem import (
     TIMETABLE_HORIZON,
     WATCH_DUE,
     WATCH_EVERY,
+    WHOLE,
     Problem,
     Taken,
 )
@@ -47,6 +48,7 @@ from mbsim.integrators.control import (
 )
 from mbsim.integrators.newton import check_repeats
 from mbsim.integrators.positions import jumps
+from mbsim.integrators.rows import look_inside, outputs
 from mbsim.integrators.scheme import (
     AFTER_REJECTION,
     CHANGE_DUE,
@@ -72,9 +74,7 @@ from mbsim.integrators.scheme import (
     LAST_TIME,
     LEFT_OVER,
     LEFT_TIME,
-    NEXT_OUTPUT,
     NEXT_WATCH,
-    OUTPUTS,
     OWN_TIME,
     REJECTED,
     REST,
@@ -93,9 +93,9 @@ from mbsim.integrators.scheme import (
     Steps,
     failure_or,
     in_workspace,
-    interpolate,
     note_failure,
-    project,
+    part_of,
+    parts,
 )
 
 #: Where steps are cut one after another, whole ones grow so much at most.
@@ -252,53 +252,16 @@ def arrive_at(m: Method, t: float, h: float, bounded: bool, t_end: float) -> Non
 
 
 @jitable
-def outputs(p: Problem, m: Method, steps: Steps, times: F1) -> int:
-    """Write a row for every output time within the last step; return 0, FULL, or less a code."""
-    t, h = m.memory[LAST_TIME], m.memory[LAST_STEP]
-    t_new = m.memory[TIME]
-    # forces that depend on a fixed step are shown as they acted
-    within = h if steps.order == 0.0 else 0.0
-    while m.counts[NEXT_OUTPUT] < len(times):
-        when = times[m.counts[NEXT_OUTPUT]]
-        # a row at the time of an event holds what is after it
-        if when > t_new or (when == t_new and m.memory[EVENT_DUE] == 1.0):
-            return 0
-        interpolate(m, min(1.0, (when - t) / h), m.trial)
-        project(p, m, when, 0.0, m.trial)
-        m.counts[OUTPUTS] += 1
-        m.counts[NEXT_OUTPUT] += 1
-        full = call_int(p.output, (p.context, when, within, m.trial, m.error))
-        code = failure_or(m, 0)
-        if code != 0 or full != 0:
-            return -code if code != 0 else full
-    return 0
-
-
-@jitable
-def look_inside(p: Problem, m: Method, asked: float) -> int:
-    """Let the problem look at inner points of the last step; return 0 or its code."""
-    t, h, part = m.memory[LAST_TIME], m.memory[LAST_STEP], asked
-    while part >= 0.0:
-        interpolate(m, part, m.trial)
-        project(p, m, t + part * h, 0.0, m.trial)
-        m.counts[OUTPUTS] += 1
-        code = call_int(p.look, (p.context, t + part * h, part * h, m.trial, m.error))
-        if code != 0:
-            return code
-        m.error[0] = m.memory[TOL]
-        part = call_float(p.inner, (p.context, t, 0.0, m.y, m.error))
-    return 0
-
-
-@jitable
 def accept(p: Problem, m: Method, steps: Steps, t: float, h: float, asked: float) -> int:
     """Take the trial point; return the problem's word on it (`Taken`), or less a code."""
     word = call_int(p.commit, (p.context, t + h, h, m.trial, m.k[steps.last]))
     if steps.branches != 0:
         call_float(steps.branches, (steps.context, TAKEN, t, h, 0.0))
-    for i in range(len(m.y)):
-        m.y[i] = m.trial[i]
-        m.k[0, i] = m.k[steps.last, i]
+    for row in range(parts(m)):
+        begins, ends = part_of(m, row)
+        for i in range(begins, ends):
+            m.y[i] = m.trial[i]
+            m.k[0, i] = m.k[steps.last, i]
     if steps.implicit:
         left = m.memory[REST] * m.memory[CORRECTION]
         if left > m.memory[LEFT_OVER]:
@@ -346,10 +309,11 @@ def choose_next(m: Method, steps: Steps, h: float, h_max: float) -> None:
     m.memory[AFTER_REJECTION] = 0.0
 
 
-def advance(  # noqa: C901
+@jitable
+def go_on(  # noqa: C901
     steps: Steps, t_end: float, tol: float, h_max: float, h_min: float, times: F1, budget: int
 ) -> int:
-    """Advance to t_end, to full rows, or for about `budget` evaluations; return why it stopped.
+    """Go on as `advance` does.
 
     `times` are the output times, ascending; `m.counts[NEXT_OUTPUT]` is the next of them. Problem
     and method are taken from the workspace: a group is one word wherever it is handed on.
@@ -495,3 +459,18 @@ def advance(  # noqa: C901
             m.memory[CHANGE_DUE] = 0.0
             return CHANGES_OVER
     return DONE
+
+
+def advance(
+    steps: Steps, t_end: float, tol: float, h_max: float, h_min: float, times: F1, budget: int
+) -> int:
+    """Advance to t_end, to full rows, or for about `budget` evaluations; return why it stopped.
+
+    See `go_on`. Of what steps do not change nothing is known when it is called, nor is anything to
+    be when it is back: all that is scratch may be filled with NaN in between.
+    """
+    _, m = in_workspace(steps.context)
+    m.whole[0] = WHOLE
+    why = go_on(steps, t_end, tol, h_max, h_min, times, budget)
+    m.whole[0] = WHOLE
+    return why

@@ -36,9 +36,9 @@ import numpy as np
 
 from mbsim.core import tags
 from mbsim.core.address import call_int, view
-from mbsim.core.arrays import F1, F2, I1, V3
+from mbsim.core.arrays import F1, F2, I1, I2, V3
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import STATE, Problem
+from mbsim.core.problem import LISTED, STATE, WHOLE, Problem
 
 # memory
 TIME, STEP, ERROR_BEFORE, HAVE_F, H_SMALLEST, LAST_ERROR, H_LARGEST = range(7)
@@ -161,6 +161,10 @@ class Method(NamedTuple):
     timetable: F2  # (rows, 2) where each row ends, how far a step may go from it; see `driver`
     # (7,) of the systems that an implicit step solves, as `factor` and `factor_pair` take them
     coefficients: tags.Scratch[F1]
+    # (2,) WHOLE where steps change any number of y, as they do unless a problem that steps with
+    # contacts of its own says which ones alone; and how many rows of `part` say that
+    whole: I1
+    part: tags.Scratch[I2]  # (parts, 2) begin and end
 
 
 @tags.constant
@@ -222,6 +226,8 @@ def make(scheme: Scheme, y0: Any, t0: float, kinds: Any = None, rows: int = 1) -
         np.zeros((scheme.carried, n)),
         np.full((rows, 2), math.inf),
         np.zeros(COEFFICIENTS),
+        np.array([WHOLE, 0]),
+        np.zeros((0, 2), dtype=np.int64),
     )
 
 
@@ -304,11 +310,27 @@ def combine(k: F2, weights: F1, count: int, out: F1) -> None:
 
 @jitable
 def interpolate(m: Method, s: float, out: F1) -> None:
-    """Write the state at the part s (0..1) of the last fitted step into `out`."""
+    """Write the state at the part s (0..1) of the last fitted step into `out`, as it changes."""
     d, r = m.dense, 1.0 - s
     last = len(d) - 1
-    for i in range(len(out)):
-        value = d[last, i]
-        for j in range(last - 1, -1, -1):
-            value = d[j, i] + (s if j % 2 == 0 else r) * value
-        out[i] = value
+    for row in range(parts(m)):
+        begin, end = part_of(m, row)
+        for i in range(begin, end):
+            value = d[last, i]
+            for j in range(last - 1, -1, -1):
+                value = d[j, i] + (s if j % 2 == 0 else r) * value
+            out[i] = value
+
+
+@jitable
+def parts(m: Method) -> int:
+    """Return how many ranges of numbers of y a step changes."""
+    return m.whole[1] if m.whole[0] == LISTED else 1
+
+
+@jitable
+def part_of(m: Method, k: int) -> tuple[int, int]:
+    """Return begin and end of the k-th of them."""
+    if m.whole[0] == LISTED:
+        return m.part[k, 0], m.part[k, 1]
+    return 0, len(m.y)

@@ -94,6 +94,8 @@ class Methods:
             from mbsim.stepping.setup import rigid_mechanism
 
             self.rigid = rigid_mechanism(system, fixed, tol)
+            awake = system.scene.awake
+            self.arrays = self.arrays._replace(whole=awake.whole, part=awake.part)
             self.problem = self.rigid.problem
         else:
             from mbsim.dynamics.pipeline.problem import mechanism

@@ -64,10 +64,16 @@ W_NN, W_NX, W_NZ, W_XX, W_XZ, W_ZZ, STOPS, ALONG, SCHUR = 47, 48, 49, 50, 51, 52
 GIVEN = 65
 # entries of `Rest.body`: 1 where a body sleeps; its island then; steps for which it was still; 1
 # where nothing of the island of which it is the first moves; of `Rest.count`: how many sleep, 1
-# where some were woken in the step at hand; of `Kept.count`, behind how many there are: of what
-# sleeps
+# where some were woken in the step at hand, see below; of `Kept.count`, behind how many there are:
+# of what sleeps
 ASLEEP, ISLAND, CALM_STEPS, QUIET = range(4)
-SLEEPERS, WOKEN = 0, 1
+# and in which others sleep than in the step before; how many near pairs stand before those of which
+# something is awake, 0 where they are not sorted so; 1 where the table of what does not move is
+# filled; how many pairs are listed, and those for good among them
+SLEEPERS, WOKEN, CHANGED, ASIDE, GRID, LISTED_PAIRS, LISTED_FIXED = range(7)
+REST_COUNTS = 7
+# bits of `Rest.side`
+OF_I, OF_J = 1, 2
 SLEEPING_ROWS = 1
 # entries of `Tally.load`: of the step tried last, its first half and its second; 1 where friction
 # yields at the begin of the step at hand, as far as is known; else how long after that, as the last
@@ -190,8 +196,18 @@ class Rest(NamedTuple):
 
     body: I2  # (nb, 4)
     since: F1  # (nb,) when a body that is still became so
-    count: I1  # type: ignore[assignment]  # (2,)
+    count: I1  # type: ignore[assignment]  # (REST_COUNTS,)
+    net: F2  # (nc, 3) force of each contact between what sleeps
+    grounded: I1  # (groups,) 1 where ground presses on a body of a group that sleeps
     parent: tags.Scratch[I1]  # (nb,) an earlier body of the same island
+    pair: tags.Scratch[I1]  # (pairs,) near pairs of which something is awake, see `awake`
+    # (ng, 1 + large contacts) 1 for members of some, then whether of I, of J: see `near_pairs`
+    side: tags.Constant[I2]
+    still: tags.Scratch[I1]  # (2^k,) first member of a cell that does not move, -1 for none
+    moving: tags.Scratch[I1]  # (2^k,) the same of those that are awake
+    next: tags.Scratch[I1]  # (ng,) next one of the same cell
+    giants: tags.Scratch[I1]  # (ng + 1,) how many do not move and fit into no cell, then these
+    width: tags.Scratch[F1]  # (2,) of a cell, and the skin of boxes
 
 
 class Stepping(NamedTuple):
@@ -206,11 +222,38 @@ class Stepping(NamedTuple):
     rest: Rest
 
 
-def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int, int]) -> Stepping:
+def at_rest(nb: int, nc: int, pairs: int, groups: int, side: I2) -> Rest:
+    """Return arrays for bodies of which none sleeps."""
+
+    def whole(*shape: int) -> np.ndarray:
+        return np.zeros(shape, dtype=np.int64)
+
+    ng = len(side)
+    room = 1 << max(4, int(2 * ng).bit_length())
+    return Rest(
+        body=whole(nb, 4),
+        since=np.zeros(nb),
+        count=whole(REST_COUNTS),
+        net=np.zeros((nc, 3)),
+        grounded=whole(groups),
+        parent=whole(nb),
+        pair=whole(pairs),
+        side=side,
+        still=whole(room),
+        moving=whole(room),
+        next=whole(ng),
+        giants=whole(ng + 1),
+        width=np.zeros(2),
+    )
+
+
+def make(
+    rules: Rules, plan: Plan, side: I2, sizes: tuple[int, int, int, int, int, int, int]
+) -> Stepping:
     """Return empty arrays.
 
     `sizes` are the numbers of bodies, graphics, numbers of y, contact points, pairs, wide rows,
-    groups of bodies.
+    groups of bodies; `side` is that of `Rest`.
     """
     nb, ng, ny, m, pairs, wide, groups = sizes
 
@@ -274,8 +317,8 @@ def make(rules: Rules, plan: Plan, sizes: tuple[int, int, int, int, int, int, in
     room = 1 << max(4, int(4 * m - 1).bit_length())
     table, spare = numbers(m, KEPT_COLUMNS), numbers(m, KEPT_COLUMNS)
     kept = Kept(whole(2), whole(m), table, whole(m), spare, whole(room))
-    rest = Rest(whole(nb, 4), numbers(nb), whole(2), whole(nb))
     nc = len(rules.number)
+    rest = at_rest(nb, nc, pairs, groups, side)
     tally = Tally(
         np.zeros(TALLY_NUMBERS), whole(TALLY_COUNTS), numbers(nc, LOADS), whole(groups), numbers(nc)
     )

@@ -43,17 +43,15 @@ from mbsim.stepping.arrays import (
     END_OFF,
     FASTEST,
     FIXED,
-    KEPT_BODY_I,
-    KEPT_BODY_J,
     LEFT_OPEN,
     POINTS,
     RESIDUAL,
-    SLEEPING_ROWS,
+    SLEEPERS,
     STEP_LENGTH,
     Stepping,
 )
 from mbsim.stepping.friction import left_of
-from mbsim.stepping.step import find_forces, note_grounded
+from mbsim.stepping.step import find_forces
 
 #: Rounding of friction on its cone.
 CONE_ROUNDING = 1e-12
@@ -116,11 +114,8 @@ def examine_step(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> None:
 @jitable
 def mark_grounded(scene: Scene, S: Stepping) -> None:
     """Mark the groups that ground pressed on since the last sample, and begin anew."""
-    for row in range(S.kept.count[SLEEPING_ROWS]):
-        i, j = int(S.kept.table[row, KEPT_BODY_I]), int(S.kept.table[row, KEPT_BODY_J])
-        note_grounded(scene, S, i, j)
     for g in range(len(S.tally.grounded)):
-        if S.tally.grounded[g] == 1:
+        if S.tally.grounded[g] == 1 or (S.rest.count[SLEEPERS] > 0 and S.rest.grounded[g] == 1):
             scene.audit.sums[g, SPINS + 1] = 1.0
         S.tally.grounded[g] = 0
 

@@ -17,6 +17,7 @@ from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
 from mbsim.core.rotation import matrix_from_quaternion, norm, unrotate, vector
+from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
 from mbsim.dynamics.bodies.configuration import turn
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.stepping.arrays import ASLEEP, LEFT_SPEED, POINTS, STEP_LENGTH, Stepping
@@ -46,10 +47,13 @@ def meets_at(gap: float, h: float, before: float, free: float) -> float:
 
 
 @jitable
-def start_parts(S: Stepping, count: int, h: float, slop: float, ground: int) -> None:
+def start_parts(scene: Scene, S: Stepping, count: int, h: float, slop: float) -> None:
     """Fill what each point that presses makes of the way of its two bodies."""
-    P, M = S.points, S.motion
-    for b in range(ground + 1):
+    P, M, ground = S.points, S.motion, len(S.rest.body)
+    M.part[ground] = M.touch[ground] = NO_IMPACT
+    M.flies[ground] = FLIES
+    for row in range(bodies_awake(scene)):
+        b = body_awake(scene, row)
         M.part[b] = M.touch[b] = NO_IMPACT
         M.flies[b] = FLIES
     for k in range(count):
@@ -66,7 +70,10 @@ def start_parts(S: Stepping, count: int, h: float, slop: float, ground: int) -> 
         for b in (i, j):
             M.part[b], M.touch[b] = min(M.part[b], part), min(M.touch[b], touch)
             M.flies[b] = min(M.flies[b], flies)
-    for b in range(ground + 1):
+    if M.part[ground] == NO_IMPACT:
+        M.part[ground] = 0.5
+    for row in range(bodies_awake(scene)):
+        b = body_awake(scene, row)
         if M.part[b] == NO_IMPACT:
             M.part[b] = 0.5
 
@@ -84,13 +91,13 @@ def take_least(S: Stepping, i: int, j: int) -> bool:
 
 
 @jitable
-def spread_parts(S: Stepping, count: int, h: float, slop: float, ground: int) -> None:
+def spread_parts(scene: Scene, S: Stepping, count: int, h: float, slop: float) -> None:
     """Find the bodies that a contact stops in the step, all that press on them, and joints hold.
 
     Between two bodies of different parts a contact that stays closed would open or go deeper.
     """
-    P, plan = S.points, S.plan
-    start_parts(S, count, h, slop, ground)
+    P, plan, ground = S.points, S.plan, len(S.rest.body)
+    start_parts(scene, S, count, h, slop)
     changed = True
     while changed:
         changed = False
@@ -105,10 +112,11 @@ def spread_parts(S: Stepping, count: int, h: float, slop: float, ground: int) ->
 
 
 @jitable
-def fill_shift(S: Stepping, nb: int) -> None:
+def fill_shift(scene: Scene, S: Stepping) -> None:
     """Fill displacements over the step's length."""
     M = S.motion
-    for b in range(nb):
+    for k in range(bodies_awake(scene)):
+        b = body_awake(scene, k)
         part = M.part[b]
         bent = 0.0
         if M.touch[b] != NO_IMPACT and M.flies[b] != PRESSED:
@@ -122,7 +130,7 @@ def fill_shift(S: Stepping, nb: int) -> None:
 
 
 @jitable
-def velocities_jump(S: Stepping, nb: int) -> bool:
+def velocities_jump(scene: Scene, S: Stepping) -> bool:
     """Return whether some body met another one in the step: velocities jump within it."""
     P, M, seen = S.points, S.motion, S.plan.number[LEFT_SPEED]
     for k in range(S.tally.count[POINTS]):
@@ -130,7 +138,8 @@ def velocities_jump(S: Stepping, nb: int) -> bool:
             return True
     if S.tally.count[POINTS] == 0:
         return False
-    for b in range(nb):
+    for k in range(bodies_awake(scene)):
+        b = body_awake(scene, k)
         v, free, before = M.v[b], M.free[b], M.before[b]
         jump = norm((v[0] - before[0], v[1] - before[1], v[2] - before[2]))
         usual = norm((free[0] - before[0], free[1] - before[1], free[2] - before[2]))
@@ -143,7 +152,8 @@ def velocities_jump(S: Stepping, nb: int) -> bool:
 def move_bodies(scene: Scene, S: Stepping, y: F1, h: float, new: F1) -> None:
     """Write positions and velocities after the step."""
     M = S.motion
-    for b in range(len(scene.bodies.mass)):
+    for k in range(bodies_awake(scene)):
+        b = body_awake(scene, k)
         at, R = BODY_SIZE * b, scene.work.R[b]
         if S.rest.body[b, ASLEEP] == 1:
             for c in range(at, at + BODY_SIZE):
@@ -191,9 +201,12 @@ def place_within(scene: Scene, S: Stepping, y: F1, s: float, out: F1) -> None:
     """
     M, h = S.motion, S.tally.number[STEP_LENGTH]
     place_bodies(scene, y)
-    for k in range(len(y)):
+    for k in range(BODY_SIZE * len(scene.bodies.mass), len(y)):
         out[k] = y[k]
-    for b in range(len(scene.bodies.mass)):
+    for k in range(bodies_awake(scene)):
+        b = body_awake(scene, k)
+        for c in range(BODY_SIZE * b, BODY_SIZE * (b + 1)):
+            out[c] = y[c]
         for c in range(6):
             M.shift[b, c] = way_within(S, b, c, s)
     move_bodies(scene, S, y, h, out)

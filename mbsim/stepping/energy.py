@@ -17,6 +17,7 @@ from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import AT_W, BODY_SIZE
 from mbsim.core.rotation import add, dot, rotate, scale, sub, unrotate, vector
+from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
 from mbsim.stepping.arrays import ASLEEP, LEFT_OPEN, Stepping
 
 
@@ -34,7 +35,8 @@ def left_by_forces(scene: Scene, S: Stepping, h: float) -> float:
     Bodies are turned as at the step's begin. What spins are to have is kept in `Motion.spins`.
     """
     M, total = S.motion, 0.0
-    for b in range(len(scene.bodies.mass)):
+    for k in range(bodies_awake(scene)):
+        b = body_awake(scene, k)
         if S.rest.body[b, ASLEEP] == 1:
             continue
         before, v, shift = M.before[b], M.v[b], M.shift[b]
@@ -53,7 +55,8 @@ def left_by_forces(scene: Scene, S: Stepping, h: float) -> float:
 def left_by_spins(scene: Scene, S: Stepping, new: F1) -> float:
     """Return by how much kinetic energies of free bodies' spins are not what impulses make them."""
     total = 0.0
-    for b in range(len(scene.bodies.mass)):
+    for k in range(bodies_awake(scene)):
+        b = body_awake(scene, k)
         if scene.tree.of_body[b] < 0 and S.rest.body[b, ASLEEP] == 0:
             w = vector(new, BODY_SIZE * b + AT_W)
             kinetic = 0.5 * dot(w, rotate(scene.bodies.inertia[b], w))

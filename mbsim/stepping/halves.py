@@ -16,6 +16,7 @@ from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import AT_Q, AT_V, BODY_SIZE
+from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
 from mbsim.stepping.arrays import (
     CLOSED,
     COMPARED,
@@ -107,7 +108,8 @@ def take_fixed_step(scene: Scene, S: Stepping, t: float, h: float, y: F1, new: F
     if code != 0:
         return code
     end = 0.0
-    for b in range(len(scene.bodies.mass)):
+    for k in range(bodies_awake(scene)):
+        b = body_awake(scene, k)
         end = max(end, distance(scene, b, new, half[1]))
     number[END_OFF] = RICHARDSON * end
     return take_part(scene, S, t, h, y, new, True)

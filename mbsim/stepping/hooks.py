@@ -19,6 +19,7 @@ from mbsim.dynamics.pipeline.hooks import accept
 from mbsim.dynamics.pipeline.output import no_room, scaled_error
 from mbsim.stepping.arrays import ALL_STEPS, FIXED, HIT, Stepping
 from mbsim.stepping.audit import examine_step, mark_grounded
+from mbsim.stepping.awake import list_awake, settle
 from mbsim.stepping.displacements import place_within
 from mbsim.stepping.friction import keep_yield, part_to_yield
 from mbsim.stepping.halves import take_fixed_step
@@ -69,7 +70,7 @@ def serve_contacts(context: int, what: int, t: float, h: float, a: Pointer, b: P
     elif what == Contacts.WATCH:
         watch_peaks(scene, S, t)
     elif what == Contacts.GAPS:
-        commit_distances(scene)
+        commit_distances(scene, S)
     elif what == Contacts.TOUCHED:
         mark_grounded(scene, S)
     elif what == Contacts.ENERGY:
@@ -92,6 +93,8 @@ def step(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     if h == 0.0:
         place_within(scene, S, y, t, new)
         return 0
+    if committed:
+        list_awake(scene, S, y)
     if S.plan.number[FIXED] == 1.0:
         code = take_fixed_step(scene, S, t, length, y, new)
     else:
@@ -135,8 +138,9 @@ def commit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     if h > 0.0:
         let_sleep(scene, S, t, h, y)
     else:
-        wake_all(S)
+        wake_all(scene, S)
     examine_step(scene, S, t, h, y)
+    settle(scene, S)
     word = 0
     if no_room(scene):
         word += Taken.ROWS_FULL

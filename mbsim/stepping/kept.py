@@ -53,7 +53,7 @@ def place_of(key: int, room: int) -> int:
 def room_of(S: Stepping) -> int:
     """Return how many places of the table of keys are in use: it is cleared at every step."""
     room = 16
-    while room < 4 * S.kept.count[0]:
+    while room < 4 * (S.kept.count[0] - S.kept.count[SLEEPING_ROWS]):
         room *= 2
     return room
 

@@ -25,6 +25,8 @@ from mbsim.integrators.scheme import (
     Method,
     Scheme,
     in_workspace,
+    part_of,
+    parts,
     project,
 )
 
@@ -81,13 +83,21 @@ def turns(q: F1, i: int) -> tuple[float, float, float, float]:
 @jitable
 def fit_dense(m: Method, h: float, d: F2) -> None:
     """Fill the step as straight lines, and positions of bodies that met nothing as parabolas."""
+    for row in range(parts(m)):
+        begin, end = part_of(m, row)
+        fit_part(m, h, d, begin, end)
+
+
+@jitable
+def fit_part(m: Method, h: float, d: F2, begin: int, end: int) -> None:
+    """Fill it for these numbers, which begin with a whole body's."""
     y, w = m.y, m.trial
-    for i in range(len(y)):
+    for i in range(begin, end):
         d[0, i] = y[i]
         d[1, i] = w[i] - y[i]
         d[2, i] = 0.0
-    i = 0
-    while i + SPIN + 3 <= len(y) and m.kinds[i] == POSITION:
+    i = begin
+    while i + SPIN + 3 <= end and m.kinds[i] == POSITION:
         if bends(y, w, h, i):
             for c in range(i, i + 3):
                 d[2, c] = -0.5 * h * (w[c + SHIFT] - y[c + SHIFT])
@@ -95,7 +105,7 @@ def fit_dense(m: Method, h: float, d: F2) -> None:
             for c in range(4):
                 d[2, i + 3 + c] = -0.5 * h * (last[c] - first[c])
         i += OF_POSITION
-        while i < len(y) and m.kinds[i] == VELOCITY:
+        while i < end and m.kinds[i] == VELOCITY:
             i += 1
 
 
@@ -119,13 +129,15 @@ def attempt(p: Problem, m: Method, t: float, h: float) -> int:
     if not met:
         # rows are those of the polynomial
         fit_dense(m, h, d)
-        for i in range(len(m.y)):
-            within[i] = d[0, i] + 0.5 * (d[1, i] + 0.5 * d[2, i])
-    for i in range(len(m.y)):
-        m.error[i] = 0.0
-        if m.kinds[i] == POSITION:
-            end, half = m.trial[i] - whole[i], within[i] - middle[i]
-            m.error[i] = end if abs(end) > abs(half) else half
+    for row in range(parts(m)):
+        first, last = part_of(m, row)
+        for i in range(first, last):
+            if not met:
+                within[i] = d[0, i] + 0.5 * (d[1, i] + 0.5 * d[2, i])
+            m.error[i] = 0.0
+            if m.kinds[i] == POSITION:
+                end, half = m.trial[i] - whole[i], within[i] - middle[i]
+                m.error[i] = end if abs(end) > abs(half) else half
     error = call_float(p.norm, (p.context, t, h, m.error, m.trial))
     m.memory[LAST_ERROR] = error / m.memory[TOL]
     m.memory[REACH] = call_float(p.norm, (p.context, h, YIELDS, m.error, m.trial))

@@ -10,16 +10,18 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import ACTIVE, LISTINGS, NARROWPHASE, SKIPPED, WANTED
+from mbsim.arrays.codes import LISTINGS, NARROWPHASE, SKIPPED, WANTED
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import norm, vector
+from mbsim.dynamics.bodies.awake import graphic_awake, graphics_awake
 from mbsim.dynamics.bodies.kinematics import place_graphics
 from mbsim.dynamics.contact.detection import measure_pair
 from mbsim.stepping.ahead import look_ahead_of, meets_after_all
 from mbsim.stepping.arrays import ASLEEP, POINTS, SOME_AHEAD, Stepping
+from mbsim.stepping.awake import pair_awake, pairs_awake
 from mbsim.stepping.points import deepest_of, fill_reach, take_rows
 from mbsim.stepping.sleep import both_sleep, one_sleeps, wake
 
@@ -63,8 +65,8 @@ def find_points(scene: Scene, S: Stepping, y: F1, h: float, committed: bool) -> 
     measured = 0
     for c in range(len(work.beyond)):
         work.beyond[c] = 0
-    for k in range(pairs.count[ACTIVE]):
-        pair = pairs.active[k]
+    for k in range(pairs_awake(scene, S)):
+        pair = pair_awake(scene, S, k)
         gi, gj = pairs.graphic_i[pair], pairs.graphic_j[pair]
         i, j = scene.graphics.body[gi], scene.graphics.body[gj]
         if both_sleep(S, i, j):
@@ -75,7 +77,7 @@ def find_points(scene: Scene, S: Stepping, y: F1, h: float, committed: bool) -> 
         if one_sleeps(S, i, j):
             measured += 1
             if meets_sleeper(scene, S, pair, reach, committed):
-                wake(S, i if S.rest.body[i, ASLEEP] == 1 else j)
+                wake(scene, S, i if S.rest.body[i, ASLEEP] == 1 else j)
             continue
         near = S.plan.near[pairs.kind[pair]] == 1
         if near and lies_still(scene, S, pair):
@@ -96,7 +98,7 @@ def find_points(scene: Scene, S: Stepping, y: F1, h: float, committed: bool) -> 
         if not room:
             return Code.NO_ROOM
     log.counters[NARROWPHASE] += measured
-    log.counters[SKIPPED] += pairs.count[ACTIVE] - measured
+    log.counters[SKIPPED] += pairs_awake(scene, S) - measured
     return 0
 
 
@@ -104,7 +106,8 @@ def find_points(scene: Scene, S: Stepping, y: F1, h: float, committed: bool) -> 
 def fill_went(scene: Scene, S: Stepping, h: float) -> bool:
     """Bound how far points of graphics go by what impulses gave; True if farther than expected."""
     graphics, M, farther = scene.graphics, S.motion, False
-    for g in range(len(graphics.body)):
+    for k in range(graphics_awake(scene)):
+        g = graphic_awake(scene, k)
         way = M.shift[graphics.body[g]]
         far, spin = norm(vector(way)), norm((way[3], way[4], way[5]))
         if spin > 0.0:
@@ -122,8 +125,8 @@ def find_missed(scene: Scene, S: Stepping, y: F1, h: float) -> int:
     farther = fill_went(scene, S, h)
     if not farther and S.plan.number[SOME_AHEAD] == 0.0:
         return 0
-    for k in range(pairs.count[ACTIVE]):
-        pair = pairs.active[k]
+    for k in range(pairs_awake(scene, S)):
+        pair = pair_awake(scene, S, k)
         gi, gj = pairs.graphic_i[pair], pairs.graphic_j[pair]
         i, j = scene.graphics.body[gi], scene.graphics.body[gj]
         if both_sleep(S, i, j):
@@ -134,7 +137,7 @@ def find_missed(scene: Scene, S: Stepping, y: F1, h: float) -> int:
         room = True
         if one_sleeps(S, i, j):
             if meets_sleeper(scene, S, pair, went, False):
-                wake(S, i if S.rest.body[i, ASLEEP] == 1 else j)
+                wake(scene, S, i if S.rest.body[i, ASLEEP] == 1 else j)
         elif S.plan.near[pairs.kind[pair]] == 1:
             reach = M.reach[gi] + M.reach[gj]
             if went > reach:
@@ -145,15 +148,16 @@ def find_missed(scene: Scene, S: Stepping, y: F1, h: float) -> int:
         if not room:
             return -Code.NO_ROOM
     if farther:
-        for g in range(len(M.reach)):
+        for k in range(graphics_awake(scene)):
+            g = graphic_awake(scene, k)
             M.reach[g] = max(M.reach[g], M.went[g])
     return S.tally.count[POINTS] - before
 
 
 @jitable
-def commit_distances(scene: Scene) -> None:
+def commit_distances(scene: Scene, S: Stepping) -> None:
     """Take what shapes have moved from the distance of every pair."""
     pairs, travel = scene.pairs, scene.work.travel
-    for k in range(pairs.count[ACTIVE]):
-        pair = pairs.active[k]
+    for k in range(pairs_awake(scene, S)):
+        pair = pair_awake(scene, S, k)
         pairs.left[pair] -= travel[pairs.graphic_i[pair]] + travel[pairs.graphic_j[pair]]

@@ -10,6 +10,7 @@ from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import any_tangent, cross, dot, norm, vector
+from mbsim.dynamics.bodies.awake import graphic_awake, graphics_awake
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.forces import IGNORE_DEEPER, sides
 from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT
@@ -50,7 +51,8 @@ def way_at(scene: Scene, S: Stepping, g: int, h: float, radius: float) -> float:
 @jitable
 def fill_reach(scene: Scene, S: Stepping, h: float) -> None:
     """Bound how far any point of a graphic may come in a step, by its body's velocities."""
-    for g in range(len(scene.graphics.body)):
+    for k in range(graphics_awake(scene)):
+        g = graphic_awake(scene, k)
         S.motion.reach[g] = way_at(scene, S, g, h, scene.graphics.radius[g])
 
 

@@ -128,9 +128,10 @@ def watch_peaks(scene: Scene, S: Stepping, t: float) -> None:
     net, log = scene.work.net, scene.log.contacts
     for c in range(len(net)):
         for j in range(3):
-            net[c, j] = 0.0
+            net[c, j] = S.rest.net[c, j]
         log[c, PEAK_DEPTH] = max(log[c, PEAK_DEPTH], S.tally.deepest[c])
-    for row in range(S.kept.count[0]):
+    # what sleeps does not slip
+    for row in range(S.kept.count[SLEEPING_ROWS], S.kept.count[0]):
         values = S.kept.table[row]
         c = int(values[KEPT_CONTACT])
         for j in range(3):

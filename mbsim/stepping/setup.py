@@ -26,6 +26,8 @@ from mbsim.stepping.arrays import (
     NEAR,
     NEWTONS,
     NOISE,
+    OF_I,
+    OF_J,
     OWN_TIME,
     PLAN_NUMBERS,
     PROJECTED,
@@ -41,9 +43,11 @@ from mbsim.stepping.arrays import (
 from mbsim.stepping.coefficients import Coefficients
 
 if TYPE_CHECKING:
+    from mbsim.arrays.state import Broadphase
     from mbsim.compile_model.build import System
     from mbsim.compile_model.pairing import Kind
     from mbsim.core.arrays import I1 as Indices
+    from mbsim.core.arrays import I2 as Table
 
 _INT, _T, _PTR = types.int64, types.float64, types.CPointer(types.float64)
 _CONTACTS = _INT(_INT, _INT, _T, _T, _PTR, _PTR)
@@ -180,6 +184,16 @@ def _groups(system: System) -> tuple[Indices, Indices, Indices]:
     return group, members, np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
 
 
+def _sides(broadphase: Broadphase, graphics: int) -> Table:
+    """Return which graphics are members of large contacts, and of which side of each."""
+    side = np.zeros((graphics, 1 + len(broadphase.contact)), dtype=np.int64)
+    for c, (i, i_end, j, j_end) in enumerate(broadphase.first.tolist()):
+        side[broadphase.member[i:i_end], 1 + c] |= OF_I
+        side[broadphase.member[j:j_end], 1 + c] |= OF_J
+    side[:, 0] = side[:, 1:].any(axis=1)
+    return side
+
+
 def _is_patch(kind: Kind) -> bool:
     """Return whether a pair's incidents are areas that have no points."""
     return kind.has_area and not kind.region
@@ -212,15 +226,18 @@ def rigid_mechanism(system: System, fixed: bool, tol: float) -> Made:
     wide = min(capacity * 2 * largest, MOST_WIDE) if largest > 0 else 1
     ng, ny = len(scene.graphics.body), scene.rows.y.shape[1]
     sizes = nb, ng, ny, capacity, len(scene.pairs.kind), wide, len(scene.audit.sums)
-    stepping = make(found.rules, plan, sizes)
+    stepping = make(found.rules, plan, _sides(scene.broadphase, ng), sizes)
     inner, outer = pack(stepping), pack(scene)
     scene.world.hooks[Hook.STEPPING] = int(inner.ctypes.data)
 
     from mbsim.stepping import hooks as own
+    from mbsim.stepping.near_pairs import list_near
 
     if len(scene.contacts.id) > 0:
         scene.world.hooks[Hook.CONTACTS] = jit.address(own.serve_contacts, _CONTACTS)
-    fill(scene, only=set(Hook) - COMPLIANT - {Hook.CONTACTS})
+    if len(scene.broadphase.contact) > 0:
+        scene.world.hooks[Hook.NEAR] = jit.address(list_near, _INT(_INT, _PTR))
+    fill(scene, only=set(Hook) - COMPLIANT - {Hook.CONTACTS, Hook.NEAR})
     hooks = {**shared.HOOKS, **own.HOOKS}
     if len(scene.sensors.id) > 0:
         from mbsim.dynamics.events.sensors import arrive_hook, happens_hook

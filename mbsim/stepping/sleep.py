@@ -10,7 +10,8 @@ solved. As soon as a point of it with anything that is awake may close within a 
 beside its weight acts on it, its whole island is awake, before the step is solved: nothing is late.
 What would have moved on at less than what the solver may leave stands: that is the error.
 
-Kept points of what sleeps are the first rows of `Kept.table`, so that nobody goes through them.
+Kept points of what sleeps are the first rows of `Kept.table`, so that nobody goes through them; nor
+does a step go through bodies, graphics and pairs that sleep (`stepping.awake`).
 """
 
 from __future__ import annotations
@@ -19,13 +20,18 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1, I1
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import AT_V, AT_W, BODY_SIZE
+from mbsim.core.problem import WHOLE
 from mbsim.core.rotation import norm, vector
+from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
 from mbsim.stepping.arrays import (
     ASLEEP,
     CALM_STEPS,
+    CHANGED,
     ISLAND,
     KEPT_BODY_I,
     KEPT_BODY_J,
+    KEPT_CONTACT,
+    KEPT_FORCE,
     MAY_SLEEP,
     OWN_TIME,
     POINTS,
@@ -60,7 +66,25 @@ def one_sleeps(S: Stepping, i: int, j: int) -> bool:
 
 
 @jitable
-def put_sleepers_first(S: Stepping) -> None:
+def sum_forces(scene: Scene, S: Stepping, rows: int) -> None:
+    """Fill what the first rows of `Kept.spare`, those of what sleeps, do in all."""
+    rest, ground, group = S.rest, len(S.rest.body), scene.scales.group
+    for c in range(len(rest.net)):
+        rest.net[c, 0] = rest.net[c, 1] = rest.net[c, 2] = 0.0
+    for g in range(len(rest.grounded)):
+        rest.grounded[g] = 0
+    for row in range(rows):
+        values = S.kept.spare[row]
+        net = rest.net[int(values[KEPT_CONTACT])]
+        for c in range(3):
+            net[c] += values[KEPT_FORCE + c]
+        i, j = int(values[KEPT_BODY_I]), int(values[KEPT_BODY_J])
+        if i == ground or j == ground:
+            rest.grounded[group[min(i, j)]] = 1
+
+
+@jitable
+def put_sleepers_first(scene: Scene, S: Stepping) -> None:
     """Put the kept points of what sleeps before all others; both keep their order."""
     kept, at = S.kept, 0
     for turn in range(2):
@@ -73,6 +97,7 @@ def put_sleepers_first(S: Stepping) -> None:
                 at += 1
         if turn == 0:
             kept.count[SLEEPING_ROWS] = at
+            sum_forces(scene, S, at)
     for row in range(at):
         kept.key[row] = kept.spare_key[row]
         for c in range(kept.table.shape[1]):
@@ -81,7 +106,15 @@ def put_sleepers_first(S: Stepping) -> None:
 
 
 @jitable
-def wake(S: Stepping, b: int) -> None:
+def note_others(scene: Scene, S: Stepping) -> None:
+    """Note that others sleep than before: a step goes through everything until that is settled."""
+    put_sleepers_first(scene, S)
+    S.rest.count[CHANGED] = 1
+    scene.awake.whole[0] = WHOLE
+
+
+@jitable
+def wake(scene: Scene, S: Stepping, b: int) -> None:
     """Wake the island of body b."""
     rest, island = S.rest, S.rest.body[b, ISLAND]
     for other in range(len(rest.body)):
@@ -90,17 +123,17 @@ def wake(S: Stepping, b: int) -> None:
             row[ASLEEP] = row[CALM_STEPS] = 0
             rest.count[SLEEPERS] -= 1
     rest.count[WOKEN] = 1
-    put_sleepers_first(S)
+    note_others(scene, S)
 
 
 @jitable
-def wake_all(S: Stepping) -> None:
+def wake_all(scene: Scene, S: Stepping) -> None:
     """Wake everything, as where what acts is another from here on."""
     for b in range(len(S.rest.body)):
         S.rest.body[b, ASLEEP] = S.rest.body[b, CALM_STEPS] = 0
     if S.rest.count[SLEEPERS] > 0:
         S.rest.count[SLEEPERS] = 0
-        put_sleepers_first(S)
+        note_others(scene, S)
 
 
 @jitable
@@ -108,9 +141,9 @@ def wake_loaded(scene: Scene, S: Stepping) -> None:
     """Wake islands on a body of which anything but its weight acts."""
     if S.rest.count[SLEEPERS] == 0:
         return
-    for b in range(len(S.rest.body)):
+    for b in scene.awake.loadable:
         if S.rest.body[b, ASLEEP] == 1 and is_loaded(scene, b):
-            wake(S, b)
+            wake(scene, S, b)
 
 
 @jitable
@@ -133,11 +166,11 @@ def root_of(parent: I1, b: int) -> int:
 
 
 @jitable
-def find_islands(S: Stepping) -> None:
+def find_islands(scene: Scene, S: Stepping) -> None:
     """Fill the island of each body that is awake: its first body."""
     P, parent, ground = S.points, S.rest.parent, len(S.rest.body)
-    for b in range(ground):
-        parent[b] = b
+    for row in range(bodies_awake(scene)):
+        parent[body_awake(scene, row)] = body_awake(scene, row)
     for k in range(S.tally.count[POINTS]):
         i, j = P.body[k, 0], P.body[k, 1]
         if i != ground and j != ground:
@@ -149,7 +182,8 @@ def find_islands(S: Stepping) -> None:
 def count_calm(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> bool:
     """Count the steps in which each body was still; return whether one was for long enough."""
     some, slow = False, left_of(S, h)
-    for b in range(len(S.rest.body)):
+    for k in range(bodies_awake(scene)):
+        b = body_awake(scene, k)
         row = S.rest.body[b]
         if row[ASLEEP] == 1:
             continue
@@ -179,15 +213,17 @@ def let_sleep(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> None:
     if S.plan.number[MAY_SLEEP] == 0.0 or not count_calm(scene, S, t, h, y):
         return
     rest, parent = S.rest, S.rest.parent
-    find_islands(S)
+    find_islands(scene, S)
     # an island with one body that is not still is awake
-    for b in range(len(rest.body)):
-        rest.body[b, QUIET] = 1
-    for b in range(len(rest.body)):
+    for k in range(bodies_awake(scene)):
+        rest.body[body_awake(scene, k), QUIET] = 1
+    for k in range(bodies_awake(scene)):
+        b = body_awake(scene, k)
         if rest.body[b, ASLEEP] == 0 and not is_calm(S, b, t):
             rest.body[root_of(parent, b), QUIET] = 0
     some = False
-    for b in range(len(rest.body)):
+    for k in range(bodies_awake(scene)):
+        b = body_awake(scene, k)
         row, first = rest.body[b], root_of(parent, b)
         if row[ASLEEP] == 0 and rest.body[first, QUIET] == 1:
             row[ASLEEP], row[ISLAND] = 1, first
@@ -195,7 +231,7 @@ def let_sleep(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> None:
             stop(S, y, b)
             some = True
     if some:
-        put_sleepers_first(S)
+        note_others(scene, S)
 
 
 @jitable

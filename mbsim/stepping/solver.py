@@ -81,10 +81,11 @@ def note_change(p: Points, changed: I1, k: int, number: int) -> None:
 
 
 @jitable
-def change_all(changed: I1, number: int) -> None:
-    """Let sweep `number + 1` go to every pair."""
-    for b in range(len(changed) - 1):
-        changed[b] = number
+def change_all(p: Points, changed: I1, count: int, number: int) -> None:
+    """Let sweep `number + 1` go to every pair; ground never changes."""
+    for k in range(count):
+        changed[p.body[k, 0]] = changed[p.body[k, 1]] = number
+    changed[len(changed) - 1] = 0
 
 
 @jitable
@@ -195,7 +196,7 @@ def sweep_on(
         p.counts[k] = 1.0 / allowed[0]
         for a in range(3):
             p.old[k, a] = p.r[k, a]
-    change_all(M.changed, 0)
+    change_all(p, M.changed, count, 0)
     while sweeps < most:
         sweeps += 1
         left, mean = sweep(p, M, count, sweeps)
@@ -214,7 +215,7 @@ def sweep_on(
         go_on(p, M, count, part, sweeps)
         before = square
         if whole:
-            change_all(M.changed, sweeps)
+            change_all(p, M.changed, count, sweeps)
     return left, sweeps, solved
 
 
@@ -288,7 +289,7 @@ def solve_points(
     left, more, solved = sweep_on(p, M, count, allowed, MOST_SWEEPS)
     if not math.isfinite(left):
         begin_anew(p, M, count)
-        change_all(M.changed, 0)
+        change_all(p, M.changed, count, 0)
         for number in range(1, FEW_SWEEPS + 1):
             left = sweep(p, M, count, number)[0]
     return left, sweeps + more, newtons, solved

@@ -19,31 +19,18 @@ import math
 from mbsim.arrays.hooks import Hook, Joints
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
-from mbsim.core.arrays import F1, V3
+from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
-from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
-from mbsim.core.rotation import (
-    add,
-    cross,
-    dot,
-    matrix_from_quaternion,
-    norm,
-    rotate,
-    scale,
-    unrotate,
-    vector,
-)
+from mbsim.core.layout import BODY_SIZE
 from mbsim.dynamics.bodies.acceleration import accelerate
-from mbsim.dynamics.bodies.configuration import turn
+from mbsim.dynamics.bodies.awake import bodies_awake, body_awake, graphic_awake, graphics_awake
 from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics
-from mbsim.dynamics.contact.broadphase import list_pairs
 from mbsim.dynamics.pipeline.evaluate import add_gravity
 from mbsim.stepping.arrays import (
     ALL_POINTS,
     ALL_STEPS,
     ALL_SWEEPS,
-    ASLEEP,
     FIXED,
     HIT,
     KEPT_STICKS,
@@ -72,6 +59,7 @@ from mbsim.stepping.displacements import (
     velocities_jump,
 )
 from mbsim.stepping.energy import keep_left, left_by_forces, left_by_spins
+from mbsim.stepping.free_motion import fill_motion
 from mbsim.stepping.friction import (
     coefficient,
     keep_loads,
@@ -83,14 +71,13 @@ from mbsim.stepping.friction import (
     noise_of,
 )
 from mbsim.stepping.kept import index_kept, recall
+from mbsim.stepping.near_pairs import list_anew
 from mbsim.stepping.one_point import apply, velocity_of
 from mbsim.stepping.pairs import find_missed, find_points
 from mbsim.stepping.points import fill_point, fill_reach, way_at
 from mbsim.stepping.sleep import wake_loaded
 from mbsim.stepping.solver import project_positions, solve_points
 
-#: Newton iterations for the spin of a body at most.
-MOST_SPINS = 12
 #: How much farther than a step can come near pairs are looked for.
 ROOM = 4.0
 #: How often a step is solved at most, as what stuck slips.
@@ -130,7 +117,8 @@ def make_room(scene: Scene, S: Stepping, y: F1, h: float) -> None:
         return
     fill_reach(scene, S, h)
     wanted, short = 0.0, False
-    for g in range(len(scene.graphics.body)):
+    for k in range(graphics_awake(scene)):
+        g = graphic_awake(scene, k)
         if not math.isinf(broadphase.room[g]):
             reach = S.motion.reach[g]
             if math.isinf(reach):
@@ -141,99 +129,20 @@ def make_room(scene: Scene, S: Stepping, y: F1, h: float) -> None:
     if short:
         broadphase.size[0] = max(broadphase.size[0], ROOM * wanted)
         place_graphics(scene, y)
-        list_pairs(scene, y)
+        list_anew(scene, S, y)
 
 
 @jitable
 def want_room(scene: Scene) -> None:
     """Have near pairs listed anew before the next try of a step, as far as shapes went in this."""
     broadphase, farthest = scene.broadphase, 0.0
-    for g in range(len(scene.graphics.body)):
+    for k in range(graphics_awake(scene)):
+        g = graphic_awake(scene, k)
         if not math.isinf(broadphase.room[g]):
             broadphase.room[g] = 0.0
             if not math.isinf(scene.work.travel[g]):
                 farthest = max(farthest, scene.work.travel[g])
     broadphase.size[0] = max(broadphase.size[0], ROOM * farthest)
-
-
-@jitable
-def spin_freely(scene: Scene, y: F1, b: int, h: float) -> V3:
-    """Return the angular velocity after h, global axes, that torques and the spin itself change.
-
-    The midpoint rule in body axes, I (w' - w) = h (T - m x I m), m = (w + w')/2: it keeps energy
-    and the size of the angular momentum of what spins freely, however long the step. The attitude
-    is then turned by m.
-    """
-    R, J = scene.work.R[b], scene.bodies.inertia[b]
-    at = BODY_SIZE * b
-    before = (y[at + AT_W], y[at + AT_W + 1], y[at + AT_W + 2])
-    T = unrotate(R, vector(scene.work.torque[b]))
-    w = before
-    for _ in range(MOST_SPINS):
-        m = scale(0.5, add(before, w))
-        L = rotate(J, m)
-        turns = cross(m, L)
-        change = rotate(J, (w[0] - before[0], w[1] - before[1], w[2] - before[2]))
-        off = add(change, scale(h, (turns[0] - T[0], turns[1] - T[1], turns[2] - T[2])))
-        k = 0.5 * h
-        # I + h/2 ([m] I - [I m]) by rows, [a] b = a x b
-        x = (
-            J[0, 0] + k * (m[1] * J[2, 0] - m[2] * J[1, 0]),
-            J[0, 1] + k * (m[1] * J[2, 1] - m[2] * J[1, 1] + L[2]),
-            J[0, 2] + k * (m[1] * J[2, 2] - m[2] * J[1, 2] - L[1]),
-        )
-        z = (
-            J[1, 0] + k * (m[2] * J[0, 0] - m[0] * J[2, 0] - L[2]),
-            J[1, 1] + k * (m[2] * J[0, 1] - m[0] * J[2, 1]),
-            J[1, 2] + k * (m[2] * J[0, 2] - m[0] * J[2, 2] + L[0]),
-        )
-        u = (
-            J[2, 0] + k * (m[0] * J[1, 0] - m[1] * J[0, 0] + L[1]),
-            J[2, 1] + k * (m[0] * J[1, 1] - m[1] * J[0, 1] - L[0]),
-            J[2, 2] + k * (m[0] * J[1, 2] - m[1] * J[0, 2]),
-        )
-        p, g, r = cross(z, u), cross(u, x), cross(x, z)
-        d = dot(x, p)
-        if d == 0.0:
-            break
-        step = scale(-1.0 / d, add(scale(off[0], p), add(scale(off[1], g), scale(off[2], r))))
-        w = add(w, step)
-        if norm(step) <= 1e-14 * norm(w):
-            break
-    m = scale(0.5, add(before, w))
-    q = y[at : at + BODY_SIZE].copy()
-    S = R.copy()
-    turn(y[at : at + BODY_SIZE], 0, h, m[0], m[1], m[2], q)
-    matrix_from_quaternion(q[AT_Q:], S)
-    return rotate(S, w)
-
-
-@jitable
-def fill_motion(scene: Scene, S: Stepping, y: F1, h: float) -> None:
-    """Fill velocities before the step and without contacts, and inverse masses."""
-    M, bodies, dy = S.motion, scene.bodies, S.motion.slope
-    for b in range(len(bodies.mass)):
-        if S.rest.body[b, ASLEEP] == 1:
-            continue
-        at, R = BODY_SIZE * b, scene.work.R[b]
-        before, free, inverse = M.before[b], M.free[b], M.inverse[b]
-        w = vector(scene.work.w[b])
-        for c in range(3):
-            before[c], before[3 + c] = y[at + AT_V + c], w[c]
-            free[c] = y[at + AT_V + c] + h * dy[at + AT_V + c]
-        if scene.tree.of_body[b] >= 0:
-            w = add(w, scale(h, rotate(R, vector(dy[at + AT_W :]))))
-        else:
-            w = spin_freely(scene, y, b, h)
-        for c in range(3):
-            free[3 + c] = w[c]
-        for r in range(3):
-            # row r of R I^-1
-            x = unrotate(bodies.inverse[b], vector(R[r]))
-            for c in range(3):
-                inverse[r, c] = inverse[r, 3 + c] = inverse[3 + r, c] = 0.0
-                inverse[3 + r, 3 + c] = dot(x, vector(R[c]))
-            inverse[r, r] = 1.0 / bodies.mass[b]
 
 
 @jitable
@@ -317,10 +226,13 @@ def prepare_points(scene: Scene, S: Stepping, h: float) -> int:
 
 
 @jitable
-def start_impulses(S: Stepping, h: float, ground: int) -> None:
+def start_impulses(scene: Scene, S: Stepping, h: float) -> None:
     """Fill what impulses have to bring about, and velocities with them as they stand."""
-    P, M = S.points, S.motion
-    for b in range(ground + 1):
+    P, M, ground = S.points, S.motion, len(S.rest.body)
+    for c in range(6):
+        M.v[ground, c] = M.free[ground, c]
+    for row in range(bodies_awake(scene)):
+        b = body_awake(scene, row)
         for c in range(6):
             M.v[b, c] = M.free[b, c]
     for k in range(S.tally.count[POINTS]):
@@ -367,7 +279,7 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
     """Find impulses and displacements of the points at hand; return 0 or a code."""
     P, M, tally = S.points, S.motion, S.tally
     count, nb = tally.count[POINTS], len(scene.bodies.mass)
-    start_impulses(S, h, nb)
+    start_impulses(scene, S, h)
     slop = S.plan.number[SLOP]
     allowed = left_of(S, h)
     left, sweeps, part, solved = 0.0, 0, S.plan.number[LEFT_PART], True
@@ -390,15 +302,15 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
         noise = noise_of(S, h) * allowed / left_of(S, h)
         if not let_yield(S, count, noise) and not changed:
             break
-    spread_parts(S, count, h, slop, nb)
-    fill_shift(S, nb)
+    spread_parts(scene, S, count, h, slop)
+    fill_shift(scene, S)
     most = max(DEEP * slop, h * S.plan.number[PUSH_SPEED])
     pushes = project_positions(P, M.shift, count, h, slop, most)
     number = tally.number
     # of two halves that make one step the worse one counts
     number[RESIDUAL] = left * allowed if committed else max(left * allowed, number[RESIDUAL])
     number[STEP_LENGTH] = h
-    hit = 1.0 if velocities_jump(S, nb) else 0.0
+    hit = 1.0 if velocities_jump(scene, S) else 0.0
     number[HIT] = hit if committed else max(hit, number[HIT])
     tally.count[ALL_SWEEPS] += sweeps
     tally.count[ALL_STEPS] += 1
@@ -421,7 +333,8 @@ def solve_by_middle(scene: Scene, S: Stepping, t: float, h: float, y: F1, commit
     M, middle, dy = S.motion, S.motion.middle, S.motion.slope
     for k in range(BODY_SIZE * len(scene.bodies.mass), len(y)):
         middle[k] = y[k] + 0.5 * h * dy[k]
-    for b in range(len(scene.bodies.mass)):
+    for k in range(bodies_awake(scene)):
+        b = body_awake(scene, k)
         for c in range(6):
             # of velocities alone: the displacement is that of `shift`
             M.v[b, c] = 0.5 * (M.before[b, c] + M.v[b, c])

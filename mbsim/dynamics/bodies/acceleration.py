@@ -7,6 +7,7 @@ from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
 from mbsim.core.rotation import cross, rotate, sub, unrotate, vector
+from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
 
 
 @jitable
@@ -14,7 +15,8 @@ def accelerate(scene: Scene, y: F1, dy: F1) -> float:
     """Fill y' of every body: x' = v, q' = q (0, w)/2, m v' = F, I w' = T - w x I w in cg axes."""
     bodies, work = scene.bodies, scene.work
     total = 0.0
-    for b in range(len(bodies.mass)):
+    for row in range(bodies_awake(scene)):
+        b = body_awake(scene, row)
         at = BODY_SIZE * b
         w = (y[at + AT_W], y[at + AT_W + 1], y[at + AT_W + 2])
         q = at + AT_Q

@@ -9,6 +9,7 @@ from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
 from mbsim.core.rotation import dot, matrix_from_quaternion, norm, rotate, sub, vector
+from mbsim.dynamics.bodies.awake import bodies_awake, body_awake, graphic_awake, graphics_awake
 
 
 @jitable
@@ -24,9 +25,9 @@ def place_body(scene: Scene, y: F1, b: int) -> None:
 
 @jitable
 def place_bodies(scene: Scene, y: F1) -> None:
-    """Fill R, v and w (global) of every moving body from y; the ground's rows stay as made."""
-    for b in range(len(scene.bodies.mass)):
-        place_body(scene, y, b)
+    """Fill R, v and w (global) of moving bodies from y; what sleeps stays, ground as made."""
+    for k in range(bodies_awake(scene)):
+        place_body(scene, y, body_awake(scene, k))
 
 
 @jitable
@@ -73,7 +74,7 @@ def plane_travel(scene: Scene, g: int) -> float:
 
 @jitable
 def place_graphics(scene: Scene, y: F1) -> bool:
-    """Place every shape that moves, and bound how far any of its points has come.
+    """Place every shape that does not sleep, and bound how far any of its points has come.
 
     Since the committed state the centre moved by |dx|, and a turn by angle a moves points at
     radius r by at most 2 r sin(a/2), cos(a/2) = |q.q0|. Return whether all shapes are where
@@ -81,7 +82,8 @@ def place_graphics(scene: Scene, y: F1) -> bool:
     """
     graphics, work, state = scene.graphics, scene.work, scene.state
     listed = True
-    for g in range(len(graphics.body)):
+    for k in range(graphics_awake(scene)):
+        g = graphic_awake(scene, k)
         b = graphics.body[g]
         if b == len(scene.bodies.mass):
             continue

@@ -13,6 +13,7 @@ from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import norm, vector
+from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
 
 #: Of the largest speed so far: what moves fast for a moment is judged by less for long.
 PART = 0.1
@@ -22,7 +23,8 @@ PART = 0.1
 def take_speeds(scene: Scene, y: F1, speeds: F1) -> None:
     """Raise PART of the speeds (groups,) to that of the bodies at y: of the cg, and of turning."""
     scales = scene.scales
-    for b in range(len(scales.group)):
+    for k in range(bodies_awake(scene)):
+        b = body_awake(scene, k)
         at, g = BODY_SIZE * b, scales.group[b]
         speed = norm((y[at + 7], y[at + 8], y[at + 9]))
         speed += scales.gyration[b] * norm((y[at + 10], y[at + 11], y[at + 12]))

@@ -36,8 +36,10 @@ from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import norm, sub, vector
+from mbsim.dynamics.bodies.awake import graphic_awake, graphics_awake
 from mbsim.dynamics.bodies.kinematics import plane_travel
 from mbsim.dynamics.contact.detection import measure_pair
+from mbsim.dynamics.contact.memory import put_aside
 
 #: Members wider than so many usual ones are held against everybody.
 GIANT = 4.0
@@ -126,30 +128,44 @@ def hold(scene: Scene, pair: int) -> None:
 
 
 @jitable
-def add_pair(scene: Scene, contact_set: int, i: int, j: int) -> None:
-    """List the I graphic i with the J graphic j of a large contact unless they are listed."""
-    graphics, pairs, broadphase = scene.graphics, scene.pairs, scene.broadphase
+def kind_of(scene: Scene, contact_set: int, i: int, j: int) -> tuple[int, int, int]:
+    """Return the kind of a pair of a large contact, -1 for none, and its graphics in its order."""
+    graphics, broadphase = scene.graphics, scene.broadphase
     if graphics.body[i] == graphics.body[j]:
-        return
+        return -1, i, j
     shapes = round(math.sqrt(broadphase.kind.shape[1]))
     match = graphics.shape[i] * shapes + graphics.shape[j]
     kind = broadphase.kind[contact_set, match]
-    if kind < 0:
-        return
     if broadphase.swap[contact_set, match] == 1:
-        i, j = j, i
-    if listed_row(scene, kind, i, j) >= 0:
-        return
+        return kind, j, i
+    return kind, i, j
+
+
+@jitable
+def take_row(scene: Scene, kind: int, i: int, j: int) -> int:
+    """Return a row for a pair that is not listed, -1 where there is none left."""
+    pairs = scene.pairs
     if pairs.count[FREE] == 0:
         pairs.count[WANTED] += 1
-        return
+        return -1
     pairs.count[FREE] -= 1
     pair = pairs.free[pairs.count[FREE]]
     pairs.kind[pair], pairs.graphic_i[pair], pairs.graphic_j[pair] = kind, i, j
     pairs.touches[pair] = 0
     # nothing is known of the distance: it is measured at once
     pairs.gap[pair] = pairs.left[pair] = 0.0
-    hold(scene, pair)
+    return pair
+
+
+@jitable
+def add_pair(scene: Scene, contact_set: int, i: int, j: int) -> None:
+    """List the I graphic i with the J graphic j of a large contact unless they are listed."""
+    kind, i, j = kind_of(scene, contact_set, i, j)
+    if kind < 0 or listed_row(scene, kind, i, j) >= 0:
+        return
+    pair = take_row(scene, kind, i, j)
+    if pair >= 0:
+        hold(scene, pair)
 
 
 @jitable
@@ -321,45 +337,6 @@ def order_by_graphic(scene: Scene) -> None:
 
 
 @jitable
-def put_aside(scene: Scene, k: int, s: int, row: F1) -> None:
-    """Copy all that belongs to the touching slot s into `row`, or with k = 1 back from it."""
-    state, work = scene.state, scene.work
-    at = 0
-    for group in (state.p, state.n, state.t, work.t):
-        for j in range(3):
-            if k == 0:
-                row[at] = group[s, j]
-            else:
-                group[s, j] = row[at]
-            at += 1
-    for group in (state.memory, state.before):
-        for j in range(group.shape[1]):
-            if k == 0:
-                row[at] = group[s, j]
-            else:
-                group[s, j] = row[at]
-            at += 1
-    for values in (state.depth, state.rate, state.normal, state.mode):
-        if k == 0:
-            row[at] = values[s]
-        else:
-            values[s] = row[at]
-        at += 1
-    for j in range(work.points.shape[1]):
-        if k == 0:
-            row[at] = work.points[s, j]
-        else:
-            work.points[s, j] = row[at]
-        at += 1
-    for j in range(work.slot.shape[1]):
-        if k == 0:
-            row[at] = work.slot[s, j]
-        else:
-            work.slot[s, j] = row[at]
-        at += 1
-
-
-@jitable
 def close_ranks(scene: Scene) -> None:
     """Move pairs to rows in the order of the list, with their slots that touch.
 
@@ -431,6 +408,22 @@ def fill_levers(scene: Scene) -> None:
 
 
 @jitable
+def refer(scene: Scene, y: F1, g: int, skin: float) -> None:
+    """Keep where a member is that moves when its pairs are listed, and how far it may go."""
+    broadphase = scene.broadphase
+    frame, reference = scene.work.frames[g], broadphase.reference[g]
+    broadphase.room[g] = 0.5 * skin
+    for j in range(3):
+        reference[j] = frame[j]
+    if math.isinf(scene.graphics.radius[g]):
+        for j in range(3):
+            reference[3 + j] = frame[5 + 3 * j]
+    else:
+        for j in range(4):
+            reference[3 + j] = y[BODY_SIZE * scene.graphics.body[g] + 3 + j]
+
+
+@jitable
 def list_pairs(scene: Scene, y: F1) -> None:
     """List the near pairs of all large contacts at the committed state, and how long that holds."""
     broadphase, pairs = scene.broadphase, scene.pairs
@@ -454,28 +447,18 @@ def list_pairs(scene: Scene, y: F1) -> None:
     close_ranks(scene)
     for k in range(len(broadphase.member)):
         g = broadphase.member[k]
-        b = scene.graphics.body[g]
-        if b == ground:
-            continue
-        frame, reference = scene.work.frames[g], broadphase.reference[g]
-        broadphase.room[g] = 0.5 * skin
-        for j in range(3):
-            reference[j] = frame[j]
-        if math.isinf(scene.graphics.radius[g]):
-            for j in range(3):
-                reference[3 + j] = frame[5 + 3 * j]
-        else:
-            for j in range(4):
-                reference[3 + j] = y[BODY_SIZE * b + 3 + j]
+        if scene.graphics.body[g] != ground:
+            refer(scene, y, g, skin)
 
 
 @jitable
-def follow(scene: Scene, y: F1) -> None:
-    """Find out how far each member may still move; list the pairs anew where half of it is gone."""
+def is_used_up(scene: Scene, y: F1) -> bool:
+    """Find out how far each member may still move; return whether half of it is gone for one."""
     broadphase, graphics = scene.broadphase, scene.graphics
     half = 0.5 * broadphase.size[0]
     anew = False
-    for g in range(len(graphics.body)):
+    for row in range(graphics_awake(scene)):
+        g = graphic_awake(scene, row)
         b = graphics.body[g]
         if b == len(scene.bodies.mass):
             continue
@@ -495,5 +478,11 @@ def follow(scene: Scene, y: F1) -> None:
         broadphase.room[g] = half - travel
         if travel > 0.5 * half:
             anew = True
-    if anew:
+    return anew
+
+
+@jitable
+def follow(scene: Scene, y: F1) -> None:
+    """List the pairs anew where a member may move half as far as it could."""
+    if is_used_up(scene, y):
         list_pairs(scene, y)

@@ -120,3 +120,42 @@ def commit_memory(scene: Scene, t: float, y: F1, s: int, fresh: bool) -> int:
             y[z + k] = state.memory[s, k]
     state.mode[s] = branch
     return CONSTRAINTS_CHANGED if mode != before else 1
+
+
+@jitable
+def put_aside(scene: Scene, k: int, s: int, row: F1) -> None:
+    """Copy all that belongs to the touching slot s into `row`, or with k = 1 back from it."""
+    state, work = scene.state, scene.work
+    at = 0
+    for group in (state.p, state.n, state.t, work.t):
+        for j in range(3):
+            if k == 0:
+                row[at] = group[s, j]
+            else:
+                group[s, j] = row[at]
+            at += 1
+    for group in (state.memory, state.before):
+        for j in range(group.shape[1]):
+            if k == 0:
+                row[at] = group[s, j]
+            else:
+                group[s, j] = row[at]
+            at += 1
+    for values in (state.depth, state.rate, state.normal, state.mode):
+        if k == 0:
+            row[at] = values[s]
+        else:
+            values[s] = row[at]
+        at += 1
+    for j in range(work.points.shape[1]):
+        if k == 0:
+            row[at] = work.points[s, j]
+        else:
+            work.points[s, j] = row[at]
+        at += 1
+    for j in range(work.slot.shape[1]):
+        if k == 0:
+            row[at] = work.slot[s, j]
+        else:
+            work.slot[s, j] = row[at]
+        at += 1

@@ -60,6 +60,9 @@ from mbsim.arrays.codes import (
     POSITION,
     POTENTIAL,
     POTENTIAL_FIRST,
+    REST_CENTRE,
+    REST_MASS,
+    REST_SPREAD,
     SPIN,
     STEPS_ALL,
     STEPS_SINCE,
@@ -82,7 +85,9 @@ from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
+from mbsim.core.problem import LISTED
 from mbsim.core.rotation import add, cross, dot, norm, rotate, scale, sub, vector
+from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
 from mbsim.dynamics.bodies.scales import fill_squares
 from mbsim.dynamics.constraints.equations import MISMATCH, RESIDUAL
 from mbsim.dynamics.constraints.folding import is_sticking
@@ -217,15 +222,36 @@ def mark_touched(scene: Scene) -> None:
 
 
 @jitable
+def add_asleep(scene: Scene, y: F1) -> None:
+    """Add what sleeps to the sums of momentum: it has none but from where its group looks at it."""
+    audit, sums = scene.audit, scene.audit.sums
+    for g in range(len(sums)):
+        rest, row = scene.awake.rest[g], sums[g]
+        m, first = rest[REST_MASS], BODY_SIZE * audit.first[g]
+        if audit.tied[g] == 1 or m == 0.0:
+            continue
+        d = sub(vector(rest[REST_CENTRE:]), (y[first], y[first + 1], y[first + 2]))
+        u = (-y[first + 7], -y[first + 8], -y[first + 9])
+        turn = scale(m, cross(d, u))
+        row[MASS] += m
+        for k in range(3):
+            row[SHIFT + k] += m * d[k]
+            row[FLOW + k] += m * u[k]
+            row[TURN + k] += turn[k]
+        row[SPEEDS] += m * norm(u)
+        row[SPINS] += (m * norm(d) + rest[REST_SPREAD]) * norm(u)
+
+
+@jitable
 def examine_momentum(scene: Scene, t: float, y: F1, steps: float, local: float) -> None:
     """Compare the momentum of groups that ground does not touch with what their weight gives."""
-    audit, bodies, nb = scene.audit, scene.bodies, len(scene.bodies.mass)
-    sums = audit.sums
+    audit, bodies, sums = scene.audit, scene.bodies, scene.audit.sums
     for g in range(len(sums)):
         if audit.tied[g] == 0:
             for k in range(sums.shape[1]):
                 sums[g, k] = 0.0
-    for b in range(nb):
+    for row_of in range(bodies_awake(scene)):
+        b = body_awake(scene, row_of)
         g = scene.scales.group[b]
         if audit.tied[g] == 1:
             continue
@@ -241,6 +267,8 @@ def examine_momentum(scene: Scene, t: float, y: F1, steps: float, local: float) 
             row[TURN + k] += turn[k]
         row[SPEEDS] += m * norm(u)
         row[SPINS] += m * norm(d) * norm(u) + norm(spin)
+    if scene.awake.whole[0] == LISTED:
+        add_asleep(scene, y)
     if scene.world.hooks[Hook.CONTACTS] != 0:
         contacts = scene.world.hooks[Hook.CONTACTS]
         answer_of(scene, call_int(contacts, (scene, Contacts.TOUCHED, t, 0.0, y, y)))

@@ -12,20 +12,32 @@ from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
+from mbsim.core.problem import LISTED
 from mbsim.dynamics.bodies.acceleration import accelerate
+from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
 from mbsim.dynamics.bodies.kinematics import place_bodies
 
 
 @jitable
+def start_force(scene: Scene, b: int, mass: float) -> None:
+    """Let nothing but its weight act on body b."""
+    work, g = scene.work, scene.world.gravity
+    for k in range(3):
+        work.force[b, k] = mass * g[k]
+        work.torque[b, k] = 0.0
+    work.noise[b, NOISE_FORCE] = work.noise[b, NOISE_TORQUE] = 0.0
+
+
+@jitable
 def add_gravity(scene: Scene) -> None:
-    """Start the forces of every body with its weight."""
-    bodies, work, g = scene.bodies, scene.work, scene.world.gravity
-    for b in range(len(bodies.mass) + 1):
-        mass = bodies.mass[b] if b < len(bodies.mass) else 0.0
-        for k in range(3):
-            work.force[b, k] = mass * g[k]
-            work.torque[b, k] = 0.0
-        work.noise[b, NOISE_FORCE] = work.noise[b, NOISE_TORQUE] = 0.0
+    """Start the forces of every body with its weight; of what sleeps those that may be loaded."""
+    ground = len(scene.bodies.mass)
+    for k in range(bodies_awake(scene)):
+        start_force(scene, body_awake(scene, k), scene.bodies.mass[body_awake(scene, k)])
+    start_force(scene, ground, 0.0)
+    if scene.awake.whole[0] == LISTED:
+        for b in scene.awake.loadable:
+            start_force(scene, b, scene.bodies.mass[b])
 
 
 @jitable

@@ -38,8 +38,10 @@ from mbsim.core.problem import (
     FULL,
     IMPACTS_ALONE,
     RATES,
+    WHOLE,
     Taken,
 )
+from mbsim.dynamics.bodies.awake import bodies_awake, body_awake, graphic_awake, graphics_awake
 from mbsim.dynamics.bodies.configuration import differ, move_on
 from mbsim.dynamics.bodies.scales import take_speeds
 from mbsim.dynamics.contact.broadphase import follow
@@ -76,13 +78,15 @@ def accept(scene: Scene, t: float, h: float, y: F1) -> int:
         for c in range(count):
             scene.log.contacts[c, ENERGY_LOST] = y[len(y) - count + c]
         answer_of(scene, call_int(contacts, (scene, Contacts.GAPS, t, h, y, y)))
-    for b in range(ground):
+    for row in range(bodies_awake(scene)):
+        b = body_awake(scene, row)
         for k in range(4):
             state.q[b, k] = y[BODY_SIZE * b + 3 + k]
         for k in range(3):
             state.w[b, k] = scene.work.w[b, k]
     state.since[0] = t
-    for g in range(len(graphics.body)):
+    for row in range(graphics_awake(scene)):
+        g = graphic_awake(scene, row)
         if graphics.body[g] < ground:
             for k in range(3):
                 state.centre[g, k] = scene.work.frames[g, k]
@@ -104,8 +108,8 @@ def _project(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """Quaternions back to unit length, and bodies onto their constraints."""
     scene = view(context, Scene)
     y = vector_at(a, scene.rows.y.shape[1])
-    for body in range(len(scene.bodies.mass)):
-        at = BODY_SIZE * body + 3
+    for row in range(bodies_awake(scene)):
+        at = BODY_SIZE * body_awake(scene, row) + 3
         length = math.sqrt(y[at] ** 2 + y[at + 1] ** 2 + y[at + 2] ** 2 + y[at + 3] ** 2)
         for k in range(4):
             y[at + k] /= length
@@ -207,10 +211,14 @@ def _output(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     scene = view(context, Scene)
     n = scene.rows.y.shape[1]
     f = vector_at(b, n)
+    # a row has what sleeps too
+    whole = scene.awake.whole[0]
+    scene.awake.whole[0] = WHOLE
     code = evaluate_past(scene, t, h, vector_at(a, n), f)
+    full = write_row(scene, t, h, vector_at(a, n), f) if code == 0 else False
+    scene.awake.whole[0] = whole
     if code != 0:
         return -failure_or(scene, code)
-    full = write_row(scene, t, h, vector_at(a, n), f)
     if scene.world.hooks[Hook.DRY] != 0:
         answer_of(scene, call_int(scene.world.hooks[Hook.DRY], (scene, Dry.RESTICK, t, a)))
     code = failure_or(scene, 0)

@@ -49,7 +49,9 @@ from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1, V2
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
+from mbsim.core.problem import LISTED
 from mbsim.core.rotation import cross, dot, rotate, sub, vector
+from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.bodies.scales import PART, fill_squares
 from mbsim.dynamics.contact.forces import (
@@ -87,7 +89,11 @@ def fill_energy(scene: Scene, y: F1, row: F1) -> None:
     """Write kinetic, potential (gravity and springs), dissipated energy and work of motions."""
     bodies = scene.bodies
     kinetic, potential, dissipated = 0.0, 0.0, 0.0
-    for b in range(len(bodies.mass)):
+    if scene.awake.whole[0] == LISTED:
+        # of what sleeps
+        potential = scene.awake.potential[0]
+    for k in range(bodies_awake(scene)):
+        b = body_awake(scene, k)
         at = BODY_SIZE * b
         v = (y[at + 7], y[at + 8], y[at + 9])
         w = (y[at + 10], y[at + 11], y[at + 12])
@@ -319,7 +325,8 @@ def scaled_error(scene: Scene, h: float, e: F1, y: F1) -> float:
     """
     scales, squares, largest, worst = scene.scales, scene.work.squares, 0.0, -1
     fill_squares(scene, y)
-    for b in range(len(scene.bodies.mass)):
+    for k in range(bodies_awake(scene)):
+        b = body_awake(scene, k)
         at = BODY_SIZE * b
         dx = e[at] ** 2 + e[at + 1] ** 2 + e[at + 2] ** 2
         dq = e[at + 3] ** 2 + e[at + 4] ** 2 + e[at + 5] ** 2 + e[at + 6] ** 2

@@ -1,0 +1,108 @@
+"""What bodies would do in a step without contacts: velocities and spins, and inverse masses."""
+
+from __future__ import annotations
+
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1, V3
+from mbsim.core.jitable import jitable
+from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
+from mbsim.core.rotation import (
+    add,
+    cross,
+    dot,
+    matrix_from_quaternion,
+    norm,
+    rotate,
+    scale,
+    unrotate,
+    vector,
+)
+from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
+from mbsim.dynamics.bodies.configuration import turn
+from mbsim.stepping.arrays import ASLEEP, Stepping
+
+#: Newton iterations for the spin of a body at most.
+MOST_SPINS = 12
+
+
+@jitable
+def spin_freely(scene: Scene, y: F1, b: int, h: float) -> V3:
+    """Return the angular velocity after h, global axes, that torques and the spin itself change.
+
+    The midpoint rule in body axes, I (w' - w) = h (T - m x I m), m = (w + w')/2: it keeps energy
+    and the size of the angular momentum of what spins freely, however long the step. The attitude
+    is then turned by m.
+    """
+    R, J = scene.work.R[b], scene.bodies.inertia[b]
+    at = BODY_SIZE * b
+    before = (y[at + AT_W], y[at + AT_W + 1], y[at + AT_W + 2])
+    T = unrotate(R, vector(scene.work.torque[b]))
+    w = before
+    for _ in range(MOST_SPINS):
+        m = scale(0.5, add(before, w))
+        L = rotate(J, m)
+        turns = cross(m, L)
+        change = rotate(J, (w[0] - before[0], w[1] - before[1], w[2] - before[2]))
+        off = add(change, scale(h, (turns[0] - T[0], turns[1] - T[1], turns[2] - T[2])))
+        k = 0.5 * h
+        # I + h/2 ([m] I - [I m]) by rows, [a] b = a x b
+        x = (
+            J[0, 0] + k * (m[1] * J[2, 0] - m[2] * J[1, 0]),
+            J[0, 1] + k * (m[1] * J[2, 1] - m[2] * J[1, 1] + L[2]),
+            J[0, 2] + k * (m[1] * J[2, 2] - m[2] * J[1, 2] - L[1]),
+        )
+        z = (
+            J[1, 0] + k * (m[2] * J[0, 0] - m[0] * J[2, 0] - L[2]),
+            J[1, 1] + k * (m[2] * J[0, 1] - m[0] * J[2, 1]),
+            J[1, 2] + k * (m[2] * J[0, 2] - m[0] * J[2, 2] + L[0]),
+        )
+        u = (
+            J[2, 0] + k * (m[0] * J[1, 0] - m[1] * J[0, 0] + L[1]),
+            J[2, 1] + k * (m[0] * J[1, 1] - m[1] * J[0, 1] - L[0]),
+            J[2, 2] + k * (m[0] * J[1, 2] - m[1] * J[0, 2]),
+        )
+        p, g, r = cross(z, u), cross(u, x), cross(x, z)
+        d = dot(x, p)
+        if d == 0.0:
+            break
+        step = scale(-1.0 / d, add(scale(off[0], p), add(scale(off[1], g), scale(off[2], r))))
+        w = add(w, step)
+        if norm(step) <= 1e-14 * norm(w):
+            break
+    m = scale(0.5, add(before, w))
+    q = y[at : at + BODY_SIZE].copy()
+    S = R.copy()
+    turn(y[at : at + BODY_SIZE], 0, h, m[0], m[1], m[2], q)
+    matrix_from_quaternion(q[AT_Q:], S)
+    return rotate(S, w)
+
+
+@jitable
+def fill_motion(scene: Scene, S: Stepping, y: F1, h: float) -> None:
+    """Fill velocities before the step and without contacts, and inverse masses."""
+    M, bodies, dy = S.motion, scene.bodies, S.motion.slope
+    for row in range(bodies_awake(scene)):
+        b = body_awake(scene, row)
+        if S.rest.body[b, ASLEEP] == 1:
+            for c in range(6):
+                M.before[b, c] = M.free[b, c] = M.v[b, c] = M.shift[b, c] = 0.0
+            continue
+        at, R = BODY_SIZE * b, scene.work.R[b]
+        before, free, inverse = M.before[b], M.free[b], M.inverse[b]
+        w = vector(scene.work.w[b])
+        for c in range(3):
+            before[c], before[3 + c] = y[at + AT_V + c], w[c]
+            free[c] = y[at + AT_V + c] + h * dy[at + AT_V + c]
+        if scene.tree.of_body[b] >= 0:
+            w = add(w, scale(h, rotate(R, vector(dy[at + AT_W :]))))
+        else:
+            w = spin_freely(scene, y, b, h)
+        for c in range(3):
+            free[3 + c] = w[c]
+        for r in range(3):
+            # row r of R I^-1
+            x = unrotate(bodies.inverse[b], vector(R[r]))
+            for c in range(3):
+                inverse[r, c] = inverse[r, 3 + c] = inverse[3 + r, c] = 0.0
+                inverse[3 + r, 3 + c] = dot(x, vector(R[c]))
+            inverse[r, r] = 1.0 / bodies.mass[b]
