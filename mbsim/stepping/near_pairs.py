@@ -84,6 +84,8 @@ def fill_still(scene: Scene, S: Stepping, skin: float) -> None:
             for r in range(3):
                 width = broadphase.box[g, 3 + r] - broadphase.box[g, r]
                 rest.width[0] = max(rest.width[0], width)
+    # rounding makes no box wider than a cell
+    rest.width[0] *= 1.0 + 1e-6
     for at in range(len(rest.still)):
         rest.still[at] = rest.moving[at] = -1
     rest.giants[0] = 0
