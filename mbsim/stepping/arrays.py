@@ -25,21 +25,17 @@ RULE_NUMBERS = 5
 (
     KEPT_CONTACT,
     KEPT_SLOT,
-    KEPT_KIND,
-    KEPT_GRAPHIC_I,  # in the pair's order, as of `Pairs`
-    KEPT_GRAPHIC_J,
     KEPT_BODY_I,  # in the contact's order, as all that follows
     KEPT_BODY_J,
     KEPT_GAP,  # at the step's begin
     KEPT_CLOSING,  # speed before it
     KEPT_SLIP,  # behind it
     KEPT_STICKS,  # 1 where the pair's friction is less than it may be
-    KEPT_WEIGHT,
     KEPT_ROW,
     KEPT_STAYS,  # 1 where a point of the step at hand is the same one
-) = range(14)
-KEPT_POINT, KEPT_NORMAL, KEPT_TANGENT, KEPT_FORCE = 14, 17, 20, 23
-KEPT_COLUMNS = 26
+) = range(10)
+KEPT_POINT, KEPT_NORMAL, KEPT_TANGENT, KEPT_FORCE = 10, 13, 16, 19
+KEPT_COLUMNS = 22
 # entries of `Plan.number`: 1 where the error of steps is not estimated; lengths below which gaps
 # and changes of position do not count; what the solver may leave of a velocity, times h; 1 where
 # some kind of pair is not near; how fast positions are projected, see `solver.project_positions`;
@@ -82,10 +78,11 @@ OF_WHOLE, OF_FIRST, OF_SECOND, DUE, AHEAD = range(5)
 LOADS = 5
 # entries of `Tally.count`: contact points, points that press, sweeps so far, steps tried so far,
 # steps that were left unsolved, steps with positions projected, Newton iterations so far, points
-# so far, steps of the deck's length that were compared with two halves
+# so far, steps of the deck's length that were compared with two halves, bodies that steps went
+# through so far
 POINTS, PRESSING, ALL_SWEEPS, ALL_STEPS, UNSOLVED, PROJECTED, NEWTONS, ALL_POINTS = range(8)
-COMPARED = 8
-TALLY_COUNTS = 9
+COMPARED, ALL_BODIES = 8, 9
+TALLY_COUNTS = 10
 
 
 @tags.constant
@@ -128,7 +125,7 @@ class Motion(NamedTuple):
     way: F2  # (2, 6) velocities of the bodies of a pair that is moved ahead
     frames: F2  # (2, 12) of its graphics at the step's begin
     taken: I1  # (pairs + 1,) the try of a step in which a pair has points by that; last: this one
-    measured: I1  # (pairs,) list of near pairs in which its rows were measured, -1 for none
+    measured: I1  # (pairs,) 1 + list of near pairs in which its rows were measured, 0: none
     impulse: F1  # (ny,) impulses on bodies, then what they change of velocities
     middle: F1  # (ny,) state in the midst of a step
     half: F2  # (2, ny) states of a step's two halves, where it is compared with them
@@ -207,7 +204,7 @@ class Rest(NamedTuple):
     moving: tags.Scratch[I1]  # (2^k,) the same of those that are awake
     next: tags.Scratch[I1]  # (ng,) next one of the same cell
     giants: tags.Scratch[I1]  # (ng + 1,) how many do not move and fit into no cell, then these
-    width: tags.Scratch[F1]  # (2,) of a cell, and the skin of boxes
+    width: tags.Scratch[F1]  # (1,) of a cell
 
 
 class Stepping(NamedTuple):
@@ -243,7 +240,7 @@ def at_rest(nb: int, nc: int, pairs: int, groups: int, side: I2) -> Rest:
         moving=whole(room),
         next=whole(ng),
         giants=whole(ng + 1),
-        width=np.zeros(2),
+        width=np.zeros(1),
     )
 
 
@@ -280,7 +277,7 @@ def make(
         way=numbers(2, 6),
         frames=numbers(2, 12),
         taken=whole(pairs + 1),
-        measured=whole(pairs) - 1,
+        measured=whole(pairs),
         impulse=numbers(ny),
         middle=numbers(ny),
         half=numbers(2, ny),

@@ -158,15 +158,15 @@ def sum_asleep(scene: Scene, S: Stepping, y: F1) -> None:
             awake.rest[g, c] = 0.0
     for b in range(len(mass)):
         if S.rest.body[b, ASLEEP] == 1:
-            row, g = awake.rest[group[b]], scene.world.gravity
+            row, pull = awake.rest[group[b]], scene.world.gravity
             row[REST_MASS] += mass[b]
             for c in range(3):
                 row[REST_CENTRE + c] += mass[b] * y[BODY_SIZE * b + c]
-                awake.potential[0] -= mass[b] * g[c] * y[BODY_SIZE * b + c]
-    for row in awake.rest:
-        if row[REST_MASS] > 0.0:
+                awake.potential[0] -= mass[b] * pull[c] * y[BODY_SIZE * b + c]
+    for k in range(len(awake.rest)):
+        if awake.rest[k, REST_MASS] > 0.0:
             for c in range(3):
-                row[REST_CENTRE + c] /= row[REST_MASS]
+                awake.rest[k, REST_CENTRE + c] /= awake.rest[k, REST_MASS]
     for b in range(len(mass)):
         if S.rest.body[b, ASLEEP] == 1:
             row = awake.rest[group[b]]

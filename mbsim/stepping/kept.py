@@ -12,7 +12,6 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, scale, sub, vector
 from mbsim.dynamics.contact.forces import sides
-from mbsim.geometry.catalog import AT_WEIGHT
 from mbsim.stepping.arrays import (
     KEPT_BODY_I,
     KEPT_BODY_J,
@@ -20,9 +19,6 @@ from mbsim.stepping.arrays import (
     KEPT_CONTACT,
     KEPT_FORCE,
     KEPT_GAP,
-    KEPT_GRAPHIC_I,
-    KEPT_GRAPHIC_J,
-    KEPT_KIND,
     KEPT_NORMAL,
     KEPT_POINT,
     KEPT_ROW,
@@ -31,7 +27,6 @@ from mbsim.stepping.arrays import (
     KEPT_STAYS,
     KEPT_STICKS,
     KEPT_TANGENT,
-    KEPT_WEIGHT,
     POINTS,
     SLEEPING_ROWS,
     STEP_LENGTH,
@@ -185,15 +180,10 @@ def keep_points(scene: Scene, S: Stepping) -> None:
         values = kept.table[row]
         kept.key[row], values[KEPT_ROW] = P.key[k], P.row[k]
         s = P.slot[k]
-        pair = scene.slots.pair[s]
         values[KEPT_CONTACT], values[KEPT_SLOT] = P.contact[k], s
-        values[KEPT_KIND] = scene.pairs.kind[pair]
-        values[KEPT_GRAPHIC_I] = scene.pairs.graphic_i[pair]
-        values[KEPT_GRAPHIC_J] = scene.pairs.graphic_j[pair]
         gi, gj = sides(scene, s)
         values[KEPT_BODY_I], values[KEPT_BODY_J] = scene.graphics.body[gi], scene.graphics.body[gj]
         values[KEPT_GAP], values[KEPT_CLOSING] = P.gap[k], -P.closing[k]
-        values[KEPT_WEIGHT] = scene.work.points[s, AT_WEIGHT]
         x, z = velocity_of(P, k, 1, M.v), velocity_of(P, k, 2, M.v)
         values[KEPT_SLIP] = (x * x + z * z) ** 0.5
         # see `share_sticking`

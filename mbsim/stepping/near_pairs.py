@@ -35,6 +35,8 @@ from mbsim.dynamics.contact.broadphase import (
 from mbsim.stepping.arrays import ASIDE, ASLEEP, GRID, OF_I, OF_J, Stepping
 from mbsim.stepping.awake import list_near_pairs, put_pairs_aside
 
+#: Width of cells over that of boxes, when they are made.
+WIDER = 2.0
 #: Odd numbers that spread the places of cells.
 SPREAD_X, SPREAD_Y, SPREAD_Z = 73856093, 19349663, 83492791
 
@@ -71,21 +73,24 @@ def put_in(scene: Scene, S: Stepping, table: I1, g: int) -> None:
 
 
 @jitable
-def fill_still(scene: Scene, S: Stepping, skin: float) -> None:
-    """Put all members of usual size that do not move into their table."""
+def fill_still(scene: Scene, S: Stepping) -> None:
+    """Put all members of usual size that do not move into their table.
+
+    Their boxes have no skin: how far what is awake may go is in its own.
+    """
     broadphase, rest = scene.broadphase, S.rest
-    rest.width[0], rest.width[1] = 0.0, skin
+    rest.width[0] = 0.0
     for g in range(len(rest.side)):
         if rest.side[g, 0] == 1 and not is_moving(scene, S, g):
-            fill_box(scene, g, skin)
+            fill_box(scene, g, 0.0)
     for k in range(len(broadphase.member)):
         g = broadphase.member[k]
         if usual_size(scene, g):
             for r in range(3):
                 width = broadphase.box[g, 3 + r] - broadphase.box[g, r]
                 rest.width[0] = max(rest.width[0], width)
-    # rounding makes no box wider than a cell
-    rest.width[0] *= 1.0 + 1e-6
+    # what gets faster has wider boxes
+    rest.width[0] *= WIDER
     for at in range(len(rest.still)):
         rest.still[at] = rest.moving[at] = -1
     rest.giants[0] = 0
@@ -187,17 +192,17 @@ def look_around(scene: Scene, S: Stepping, g: int, skin: float) -> None:
 
 
 @jitable
-def fits(scene: Scene, S: Stepping) -> bool:
-    """Return whether all that is awake fits into cells."""
+def widest(scene: Scene, S: Stepping) -> float:
+    """Return the largest width of a box of what is awake, inf where something is a giant."""
+    most, box = 0.0, scene.broadphase.box
     for row in range(graphics_awake(scene)):
         g = graphic_awake(scene, row)
         if is_moving(scene, S, g):
             if not usual_size(scene, g):
-                return False
+                return math.inf
             for r in range(3):
-                if scene.broadphase.box[g, 3 + r] - scene.broadphase.box[g, r] > S.rest.width[0]:
-                    return False
-    return True
+                most = max(most, box[g, 3 + r] - box[g, r])
+    return most
 
 
 @jitable
@@ -225,10 +230,11 @@ def list_moving(scene: Scene, S: Stepping, y: F1) -> bool:
         g = graphic_awake(scene, row)
         if is_moving(scene, S, g):
             fill_box(scene, g, skin)
-    if scene.awake.whole[0] != LISTED or rest.count[GRID] == 0 or rest.width[1] != skin:
-        fill_still(scene, S, skin)
-    if not fits(scene, S):
+    most = widest(scene, S)
+    if most == math.inf:
         return False
+    if scene.awake.whole[0] != LISTED or rest.count[GRID] == 0 or most > rest.width[0]:
+        fill_still(scene, S)
     scene.log.counters[LISTINGS] += 1
     pairs.count[WANTED] = 0
     keep_awake(scene, S, skin)

@@ -30,7 +30,7 @@ from mbsim.stepping.sleep import both_sleep, one_sleeps, wake
 def lies_still(scene: Scene, S: Stepping, pair: int) -> bool:
     """Return whether a pair's shapes did not move since its rows were measured, in this list."""
     pairs, travel = scene.pairs, scene.work.travel
-    if S.motion.measured[pair] != scene.log.counters[LISTINGS]:
+    if S.motion.measured[pair] != 1 + scene.log.counters[LISTINGS]:
         return False
     since = pairs.gap[pair] - pairs.left[pair]
     since += travel[pairs.graphic_i[pair]] + travel[pairs.graphic_j[pair]]
@@ -42,7 +42,7 @@ def meets_sleeper(scene: Scene, S: Stepping, pair: int, reach: float, committed:
     """Return whether a pair of which one body sleeps may close as far as `reach`."""
     measure_pair(scene, pair)
     depth = deepest_of(scene, S, pair)
-    S.motion.measured[pair] = -1
+    S.motion.measured[pair] = 0
     if committed:
         scene.pairs.gap[pair] = scene.pairs.left[pair] = -depth
     return -depth <= reach
@@ -86,11 +86,11 @@ def find_points(scene: Scene, S: Stepping, y: F1, h: float, committed: bool) -> 
             measured += 1
             measure_pair(scene, pair)
             depth = deepest_of(scene, S, pair)
-            M.measured[pair] = -1
+            M.measured[pair] = 0
             if committed:
                 pairs.gap[pair] = pairs.left[pair] = -depth
                 if near and work.beyond[scene.kinds.contact[pairs.kind[pair]]] == 0:
-                    M.measured[pair] = log.counters[LISTINGS]
+                    M.measured[pair] = 1 + log.counters[LISTINGS]
             if near:
                 room = take_rows(scene, S, y, pair, (-math.inf, reach))
             else:

@@ -16,17 +16,7 @@ from mbsim.arrays.codes import (
     EVENT_SLOT,
     EVENT_TIME,
     FIRST_TOUCH,
-    INC_DEPTH,
-    INC_GRAPHIC_I,
-    INC_GRAPHIC_J,
-    INC_KIND,
-    INC_NORMAL,
     INC_POINT,
-    INC_SLOT,
-    INC_STEP,
-    INC_TANGENT,
-    INC_TOUCHES,
-    INC_WEIGHT,
     LEAVE,
     PEAK_DEPTH,
     PEAK_FORCE,
@@ -49,16 +39,10 @@ from mbsim.stepping.arrays import (
     KEPT_CONTACT,
     KEPT_FORCE,
     KEPT_GAP,
-    KEPT_GRAPHIC_I,
-    KEPT_GRAPHIC_J,
-    KEPT_KIND,
-    KEPT_NORMAL,
     KEPT_POINT,
     KEPT_SLIP,
     KEPT_SLOT,
     KEPT_STAYS,
-    KEPT_TANGENT,
-    KEPT_WEIGHT,
     POINTS,
     SLEEPING_ROWS,
     STEP_LENGTH,
@@ -171,21 +155,18 @@ def fill_contacts(scene: Scene, S: Stepping, y: F1, row: F1) -> None:
 
 @jitable
 def fill_incidents(scene: Scene, S: Stepping) -> int:
-    """Append the contact points of this row; return how many."""
+    """Append where the contact points of this row are; return how many.
+
+    The other columns are what a contact law is asked with anew, and there is none: they are 0.
+    """
     rows = scene.rows
     k = rows.used[USED_INCIDENTS]
     for number in range(S.kept.count[0]):
         values, row = S.kept.table[number], rows.incidents[k]
         for j in range(len(row)):
             row[j] = 0.0
-        row[INC_SLOT], row[INC_DEPTH] = values[KEPT_SLOT], -values[KEPT_GAP]
         for j in range(3):
             row[INC_POINT + j] = values[KEPT_POINT + j]
-            row[INC_NORMAL + j] = values[KEPT_NORMAL + j]
-            row[INC_TANGENT + j] = values[KEPT_TANGENT + j]
-        row[INC_WEIGHT], row[INC_STEP] = values[KEPT_WEIGHT], S.tally.number[STEP_LENGTH]
-        row[INC_TOUCHES], row[INC_KIND] = 1.0, values[KEPT_KIND]
-        row[INC_GRAPHIC_I], row[INC_GRAPHIC_J] = values[KEPT_GRAPHIC_I], values[KEPT_GRAPHIC_J]
         k += 1
     count = k - rows.used[USED_INCIDENTS]
     rows.used[USED_INCIDENTS] = k

@@ -15,6 +15,7 @@ from mbsim.core.problem import Problem, addresses
 from mbsim.errors import ModelError
 from mbsim.geometry.catalog import NEARS, PAIRS, REGION_ROWS
 from mbsim.stepping.arrays import (
+    ALL_BODIES,
     ALL_POINTS,
     ALL_STEPS,
     ALL_SWEEPS,
@@ -117,6 +118,7 @@ class Made(NamedTuple):
             "contact_unsolved": int(count[UNSOLVED]),
             "contact_projections": int(count[PROJECTED]),
             "contact_points": int(count[ALL_POINTS]),
+            "bodies_in_steps": int(count[ALL_BODIES]),
             "asleep_at_end": int(self.stepping.rest.count[SLEEPERS]),
         }
 

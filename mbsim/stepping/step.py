@@ -28,6 +28,7 @@ from mbsim.dynamics.bodies.awake import bodies_awake, body_awake, graphic_awake,
 from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics
 from mbsim.dynamics.pipeline.evaluate import add_gravity
 from mbsim.stepping.arrays import (
+    ALL_BODIES,
     ALL_POINTS,
     ALL_STEPS,
     ALL_SWEEPS,
@@ -384,6 +385,7 @@ def take_step(
     while S.rest.count[WOKEN] == 1:
         # once more where something wakes: with all that is awake then
         S.rest.count[WOKEN] = 0
+        S.tally.count[ALL_BODIES] += bodies_awake(scene)
         code = find_forces(scene, t, y, dy)
         if code != 0:
             return code

@@ -88,3 +88,64 @@ def test_what_hangs_in_the_air_for_a_moment_does_not_sleep(tmp_path: Path) -> No
     parts = [ball, text.contact(301, [200], [100], **decks.rubbed(0.0)), text.gravity()]
     z = run(tmp_path, parts, 0.2, True, 1e-4)["bodies/2/position"][:, 2]
     assert z[-1] == pytest.approx(0.1 + 0.2 - 0.5 * 9.81 * 0.04, abs=1e-6)
+
+
+def field(shape: str, side: int, ball: str) -> tuple[list[str], list[int]]:
+    """Return shapes that rest on the floor by rows, and what moves; and all graphics."""
+    places = [(0.3 * i, 0.3 * j, 0.1) for i in range(side) for j in range(side)]
+    ids = list(range(10, 10 + side * side))
+    solids = [
+        text.sphere(b, 1.0, 0.1, x) if shape == "sphere" else decks.cube(b, 1.0, 0.2, x)
+        for b, x in zip(ids, places, strict=True)
+    ]
+    return [*solids, ball], [*(100 * b for b in ids), 200]
+
+
+def among(
+    folder: Path, shape: str, side: int, ball: str, end: float, sleep: bool = True, h: float = 0.005
+) -> Results:
+    """Return a run of a body among so many rows of others that rest."""
+    parts, ids = field(shape, side, ball)
+    law = decks.rubbed(0.5)
+    both = [text.contact(301, ids, ids, **law)] if side > 0 else []
+    parts += [*both, text.contact(302, ids, [100], **law), text.gravity()]
+    return run(folder, parts, end, sleep, h)
+
+
+@pytest.mark.parametrize(
+    ("shape", "place", "speed"),
+    [
+        ("sphere", (-1.0, -1.0, 20.0), (0.5, 0.7, 9.0)),  # flies
+        ("sphere", (-0.5, -0.5, 0.1), (0.1, 0.1, 0.0)),  # rolls
+        ("box", (-0.5, -0.5, 0.1), (0.1, 0.1, 0.0)),
+    ],
+)
+def test_what_sleeps_is_not_gone_through(
+    tmp_path: Path, shape: str, place: tuple[float, ...], speed: tuple[float, ...]
+) -> None:
+    """One body moves among 64: of bodies and pairs a step looks at those of that one alone."""
+    ball = text.sphere(2, 1.0, 0.1, place, speed)
+    short, long = (among(tmp_path, shape, 8, ball, end) for end in (1.0, 1.5))
+    assert short.stats["asleep_at_end"] == long.stats["asleep_at_end"] == 64
+    steps = long.stats["steps"] - short.stats["steps"]
+    placed = long.stats["bodies_in_steps"] - short.stats["bodies_in_steps"]
+    pairs = sum(
+        long.stats[name] - short.stats[name] for name in ("narrowphase_pairs", "skipped_pairs")
+    )
+    # the step after compiled code was left goes through everything
+    assert placed <= 1.1 * steps + 3 * 65
+    assert pairs <= 3.0 * steps + 3 * 200
+
+
+def test_what_rolls_among_sleepers_finds_them(tmp_path: Path) -> None:
+    """A ball rolls through a field that sleeps, hits some, which hit others: as without sleep."""
+    ball = text.sphere(2, 3.0, 0.1, (-0.6, 0.45, 0.1), (2.0, 0.13, 0.0), (0.0, 20.0, 0.0))
+    sleeping, awake = (among(tmp_path, "sphere", 5, ball, 2.5, sleep) for sleep in (True, False))
+    assert sleeping.stats["pair_listings"] > 3
+    hit = 0
+    for body in (2, *range(10, 35)):
+        x, y = (found[f"bodies/{body}/position"] for found in (sleeping, awake))
+        hit += np.abs(y[-1] - y[0]).max() > 0.05
+        assert np.abs(x - y).max() < 2e-3, body
+    assert hit > 4
+    assert sleeping.stats["bodies_in_steps"] < 0.8 * awake.stats["bodies_in_steps"]
