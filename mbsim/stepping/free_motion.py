@@ -78,14 +78,22 @@ def spin_freely(scene: Scene, y: F1, b: int, h: float) -> V3:
 
 
 @jitable
+def stand(S: Stepping, b: int) -> None:
+    """Let body b go nowhere in the step."""
+    M = S.motion
+    for c in range(6):
+        M.before[b, c] = M.free[b, c] = M.v[b, c] = M.shift[b, c] = 0.0
+
+
+@jitable
 def fill_motion(scene: Scene, S: Stepping, y: F1, h: float) -> None:
     """Fill velocities before the step and without contacts, and inverse masses."""
     M, bodies, dy = S.motion, scene.bodies, S.motion.slope
+    stand(S, len(bodies.mass))
     for row in range(bodies_awake(scene)):
         b = body_awake(scene, row)
         if S.rest.body[b, ASLEEP] == 1:
-            for c in range(6):
-                M.before[b, c] = M.free[b, c] = M.v[b, c] = M.shift[b, c] = 0.0
+            stand(S, b)
             continue
         at, R = BODY_SIZE * b, scene.work.R[b]
         before, free, inverse = M.before[b], M.free[b], M.inverse[b]

@@ -10,8 +10,11 @@ from mbsim.run import loop
 
 def groups_of(runner):
     """Return all groups of arrays of a run."""
-    tangent = runner.methods._tangent
-    return [runner.system.scene, runner.method, *([tangent[0]] if tangent is not None else [])]
+    tangent, rigid = runner.methods._tangent, runner.methods.rigid
+    own = [tangent[0]] if tangent is not None else []
+    if rigid is not None:
+        own.append(rigid.stepping)
+    return [runner.system.scene, runner.method, *own]
 
 
 def forgetful(patch, budget=1):

@@ -9,6 +9,7 @@ import pytest
 
 import mbsim
 from helpers import rigid_decks as decks
+from helpers.forgetful import forgetful
 from mbsim.bench import deck as text
 from mbsim.results.reading import Results
 
@@ -149,3 +150,20 @@ def test_what_rolls_among_sleepers_finds_them(tmp_path: Path) -> None:
         assert np.abs(x - y).max() < 2e-3, body
     assert hit > 4
     assert sleeping.stats["bodies_in_steps"] < 0.8 * awake.stats["bodies_in_steps"]
+
+
+@pytest.mark.parametrize("budget", [1, 40])
+def test_when_a_run_pauses_changes_no_bit_of_it(tmp_path: Path, budget: int) -> None:
+    """A ball rolls among sleepers and wakes some; what no checkpoint holds is forgotten between."""
+    ball = text.sphere(2, 3.0, 0.1, (-0.3, 0.45, 0.1), (2.0, 0.13, 0.0), (0.0, 20.0, 0.0))
+    straight = among(tmp_path, "sphere", 5, ball, 0.8)
+    with pytest.MonkeyPatch.context() as patch:
+        forgetful(patch, budget)
+        paused = among(tmp_path, "sphere", 5, ball, 0.8)
+    assert straight.stats["bodies_in_steps"] < 0.9 * 26 * straight.stats["steps"]
+    for body in (2, *range(10, 35)):
+        for name in ("position", "quaternion", "velocity"):
+            signal = f"bodies/{body}/{name}"
+            np.testing.assert_array_equal(paused[signal], straight[signal], err_msg=signal)
+    for name in ("steps", "contact_sweeps", "pair_listings", "asleep_at_end"):
+        assert paused.stats[name] == straight.stats[name], name
