@@ -41,6 +41,7 @@ from mbsim.stepping.arrays import (
     WOKEN,
     Stepping,
 )
+from mbsim.stepping.free_motion import stand
 from mbsim.stepping.friction import left_of
 from mbsim.stepping.kept import index_kept
 
@@ -237,8 +238,7 @@ def let_sleep(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> None:
 @jitable
 def stop(S: Stepping, y: F1, b: int) -> None:
     """Let body b have no velocity."""
-    M, at = S.motion, BODY_SIZE * b
+    at = BODY_SIZE * b
     for c in range(3):
         y[at + AT_V + c] = y[at + AT_W + c] = 0.0
-    for c in range(6):
-        M.before[b, c] = M.free[b, c] = M.v[b, c] = M.shift[b, c] = 0.0
+    stand(S, b)
