@@ -196,6 +196,8 @@ AS_VELOCITIES, AS_POSITIONS, BRACKET, BOW, TURNED = 0.0, 1.0, 2.0, 3.0, 4.0
 # what a step changes of y, `Method.whole`: the numbers in `Method.part` alone; any; any, and what
 # others are is as it was in the step before, so that the next one may change parts alone
 LISTED, WHOLE, PLACED = range(3)
+#: Columns of `Method.part`.
+PART_BEGINS, PART_ENDS = range(2)
 
 # what `advance` returns
 DONE, PAUSED, STEP_TOO_SMALL, FAILED, ROWS_FULL, HAPPENED, CHANGES_OVER, WATCH_DUE = range(8)

@@ -24,7 +24,7 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
-from mbsim.core.problem import LISTED, PLACED, WHOLE
+from mbsim.core.problem import LISTED, PART_BEGINS, PART_ENDS, PLACED, WHOLE
 from mbsim.core.rotation import norm, sub, vector
 from mbsim.stepping.arrays import (
     ASIDE,
@@ -122,14 +122,14 @@ def list_bodies(scene: Scene, S: Stepping, numbers: int) -> None:
             continue
         awake.body[awake.count[AWAKE_BODIES]] = b
         awake.count[AWAKE_BODIES] += 1
-        if parts == 0 or awake.part[parts - 1, 1] != BODY_SIZE * b:
-            awake.part[parts, 0] = BODY_SIZE * b
+        if parts == 0 or awake.part[parts - 1, PART_ENDS] != BODY_SIZE * b:
+            awake.part[parts, PART_BEGINS] = BODY_SIZE * b
             parts += 1
-        awake.part[parts - 1, 1] = BODY_SIZE * (b + 1)
-    if parts == 0 or awake.part[parts - 1, 1] != BODY_SIZE * ground:
-        awake.part[parts, 0] = BODY_SIZE * ground
+        awake.part[parts - 1, PART_ENDS] = BODY_SIZE * (b + 1)
+    if parts == 0 or awake.part[parts - 1, PART_ENDS] != BODY_SIZE * ground:
+        awake.part[parts, PART_BEGINS] = BODY_SIZE * ground
         parts += 1
-    awake.part[parts - 1, 1] = numbers
+    awake.part[parts - 1, PART_ENDS] = numbers
     awake.whole[1] = parts
     for g in range(len(scene.graphics.body)):
         b = scene.graphics.body[g]
