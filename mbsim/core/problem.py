@@ -196,6 +196,8 @@ AS_VELOCITIES, AS_POSITIONS, BRACKET, BOW, TURNED = 0.0, 1.0, 2.0, 3.0, 4.0
 # what a step changes of y, `Method.whole`: the numbers in `Method.part` alone; any; any, and what
 # others are is as it was in the step before, so that the next one may change parts alone
 LISTED, WHOLE, PLACED = range(3)
+#: Entries of `Method.whole`: one of these, and how many rows of `Method.part` are in use.
+GOES, PARTS = range(2)
 #: Columns of `Method.part`.
 PART_BEGINS, PART_ENDS = range(2)
 

@@ -21,6 +21,7 @@ from mbsim.core.problem import (
     CHANGES_OVER,
     DONE,
     FAILED,
+    GOES,
     HAPPENED,
     PAUSED,
     ROWS_FULL,
@@ -470,7 +471,7 @@ def advance(
     be when it is back: all that is scratch may be filled with NaN in between.
     """
     _, m = in_workspace(steps.context)
-    m.whole[0] = WHOLE
+    m.whole[GOES] = WHOLE
     why = go_on(steps, t_end, tol, h_max, h_min, times, budget)
-    m.whole[0] = WHOLE
+    m.whole[GOES] = WHOLE
     return why

@@ -38,7 +38,7 @@ from mbsim.core import tags
 from mbsim.core.address import call_int, view
 from mbsim.core.arrays import F1, F2, I1, I2, V3
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import LISTED, PART_BEGINS, PART_ENDS, STATE, WHOLE, Problem
+from mbsim.core.problem import GOES, LISTED, PART_BEGINS, PART_ENDS, PARTS, STATE, WHOLE, Problem
 
 # memory
 TIME, STEP, ERROR_BEFORE, HAVE_F, H_SMALLEST, LAST_ERROR, H_LARGEST = range(7)
@@ -325,12 +325,12 @@ def interpolate(m: Method, s: float, out: F1) -> None:
 @jitable
 def parts(m: Method) -> int:
     """Return how many ranges of numbers of y a step changes."""
-    return m.whole[1] if m.whole[0] == LISTED else 1
+    return m.whole[PARTS] if m.whole[GOES] == LISTED else 1
 
 
 @jitable
 def part_of(m: Method, k: int) -> tuple[int, int]:
     """Return begin and end of the k-th of them."""
-    if m.whole[0] == LISTED:
+    if m.whole[GOES] == LISTED:
         return m.part[k, PART_BEGINS], m.part[k, PART_ENDS]
     return 0, len(m.y)

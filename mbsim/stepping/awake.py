@@ -24,7 +24,7 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
-from mbsim.core.problem import LISTED, PART_BEGINS, PART_ENDS, PLACED, WHOLE
+from mbsim.core.problem import GOES, LISTED, PART_BEGINS, PART_ENDS, PARTS, PLACED, WHOLE
 from mbsim.core.rotation import norm, sub, vector
 from mbsim.stepping.arrays import (
     ASIDE,
@@ -42,7 +42,7 @@ from mbsim.stepping.sleep import both_sleep
 @jitable
 def pairs_awake(scene: Scene, S: Stepping) -> int:
     """Return how many near pairs there are to go through."""
-    if scene.awake.whole[0] == LISTED:
+    if scene.awake.whole[GOES] == LISTED:
         return S.rest.count[LISTED_PAIRS]
     return scene.pairs.count[ACTIVE]
 
@@ -50,7 +50,7 @@ def pairs_awake(scene: Scene, S: Stepping) -> int:
 @jitable
 def pair_awake(scene: Scene, S: Stepping, k: int) -> int:
     """Return the k-th of them."""
-    return S.rest.pair[k] if scene.awake.whole[0] == LISTED else scene.pairs.active[k]
+    return S.rest.pair[k] if scene.awake.whole[GOES] == LISTED else scene.pairs.active[k]
 
 
 @jitable
@@ -81,20 +81,20 @@ def settle(scene: Scene, S: Stepping) -> None:
     count, whole = S.rest.count, scene.awake.whole
     if count[CHANGED] == 1:
         count[CHANGED] = count[ASIDE] = 0
-        whole[0] = WHOLE
+        whole[GOES] = WHOLE
         return
-    if count[SLEEPERS] == 0 or whole[0] != WHOLE:
+    if count[SLEEPERS] == 0 or whole[GOES] != WHOLE:
         return
     if count[ASIDE] == 0:
         put_pairs_aside(scene, S)
-    whole[0] = PLACED
+    whole[GOES] = PLACED
 
 
 @jitable
 def list_awake(scene: Scene, S: Stepping, y: F1) -> None:
     """Fill all lists where that may be, at the begin of a step."""
     awake, rest = scene.awake, S.rest
-    if awake.whole[0] != PLACED:
+    if awake.whole[GOES] != PLACED:
         return
     list_bodies(scene, S, len(y))
     sum_asleep(scene, S, y)
@@ -109,7 +109,7 @@ def list_awake(scene: Scene, S: Stepping, y: F1) -> None:
             rest.pair[rest.count[LISTED_FIXED]] = pair
             rest.count[LISTED_FIXED] += 1
     list_near_pairs(scene, S)
-    awake.whole[0] = LISTED
+    awake.whole[GOES] = LISTED
 
 
 @jitable
@@ -130,7 +130,7 @@ def list_bodies(scene: Scene, S: Stepping, numbers: int) -> None:
         awake.part[parts, PART_BEGINS] = BODY_SIZE * ground
         parts += 1
     awake.part[parts - 1, PART_ENDS] = numbers
-    awake.whole[1] = parts
+    awake.whole[PARTS] = parts
     for g in range(len(scene.graphics.body)):
         b = scene.graphics.body[g]
         if b < ground and S.rest.body[b, ASLEEP] == 0:

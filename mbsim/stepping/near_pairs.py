@@ -18,7 +18,7 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.address import vector_at, view
 from mbsim.core.arrays import F1, I1, Pointer
 from mbsim.core.jitable import jitable
-from mbsim.core.problem import LISTED
+from mbsim.core.problem import GOES, LISTED
 from mbsim.dynamics.bodies.awake import graphic_awake, graphics_awake
 from mbsim.dynamics.contact.broadphase import (
     balls_meet,
@@ -233,7 +233,7 @@ def list_moving(scene: Scene, S: Stepping, y: F1) -> bool:
     most = widest(scene, S)
     if most == math.inf:
         return False
-    if scene.awake.whole[0] != LISTED or rest.count[GRID] == 0 or most > rest.width[0]:
+    if scene.awake.whole[GOES] != LISTED or rest.count[GRID] == 0 or most > rest.width[0]:
         fill_still(scene, S)
     scene.log.counters[LISTINGS] += 1
     pairs.count[WANTED] = 0

@@ -20,7 +20,7 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1, I1
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import AT_V, AT_W, BODY_SIZE
-from mbsim.core.problem import WHOLE
+from mbsim.core.problem import GOES, WHOLE
 from mbsim.core.rotation import norm, vector
 from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
 from mbsim.stepping.arrays import (
@@ -111,7 +111,7 @@ def note_others(scene: Scene, S: Stepping) -> None:
     """Note that others sleep than before: a step goes through everything until that is settled."""
     put_sleepers_first(scene, S)
     S.rest.count[CHANGED] = 1
-    scene.awake.whole[0] = WHOLE
+    scene.awake.whole[GOES] = WHOLE
 
 
 @jitable

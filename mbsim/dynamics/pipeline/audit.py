@@ -85,7 +85,7 @@ from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
-from mbsim.core.problem import LISTED
+from mbsim.core.problem import GOES, LISTED
 from mbsim.core.rotation import add, cross, dot, norm, rotate, scale, sub, vector
 from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
 from mbsim.dynamics.bodies.scales import fill_squares
@@ -267,7 +267,7 @@ def examine_momentum(scene: Scene, t: float, y: F1, steps: float, local: float) 
             row[TURN + k] += turn[k]
         row[SPEEDS] += m * norm(u)
         row[SPINS] += m * norm(d) * norm(u) + norm(spin)
-    if scene.awake.whole[0] == LISTED:
+    if scene.awake.whole[GOES] == LISTED:
         add_asleep(scene, y)
     if scene.world.hooks[Hook.CONTACTS] != 0:
         contacts = scene.world.hooks[Hook.CONTACTS]

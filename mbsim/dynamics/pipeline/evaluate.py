@@ -12,7 +12,7 @@ from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
-from mbsim.core.problem import LISTED
+from mbsim.core.problem import GOES, LISTED
 from mbsim.dynamics.bodies.acceleration import accelerate
 from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
 from mbsim.dynamics.bodies.kinematics import place_bodies
@@ -35,7 +35,7 @@ def add_gravity(scene: Scene) -> None:
     for k in range(bodies_awake(scene)):
         start_force(scene, body_awake(scene, k), scene.bodies.mass[body_awake(scene, k)])
     start_force(scene, ground, 0.0)
-    if scene.awake.whole[0] == LISTED:
+    if scene.awake.whole[GOES] == LISTED:
         for b in scene.awake.loadable:
             start_force(scene, b, scene.bodies.mass[b])
 

@@ -36,6 +36,7 @@ from mbsim.core.problem import (
     EACH,
     FRICTION_ALONE,
     FULL,
+    GOES,
     IMPACTS_ALONE,
     RATES,
     WHOLE,
@@ -212,11 +213,11 @@ def _output(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     n = scene.rows.y.shape[1]
     f = vector_at(b, n)
     # a row has what sleeps too
-    whole = scene.awake.whole[0]
-    scene.awake.whole[0] = WHOLE
+    whole = scene.awake.whole[GOES]
+    scene.awake.whole[GOES] = WHOLE
     code = evaluate_past(scene, t, h, vector_at(a, n), f)
     full = write_row(scene, t, h, vector_at(a, n), f) if code == 0 else False
-    scene.awake.whole[0] = whole
+    scene.awake.whole[GOES] = whole
     if code != 0:
         return -failure_or(scene, code)
     if scene.world.hooks[Hook.DRY] != 0:

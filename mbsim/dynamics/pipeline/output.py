@@ -49,7 +49,7 @@ from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1, V2
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
-from mbsim.core.problem import LISTED
+from mbsim.core.problem import GOES, LISTED
 from mbsim.core.rotation import cross, dot, rotate, sub, vector
 from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
 from mbsim.dynamics.bodies.kinematics import position
@@ -89,7 +89,7 @@ def fill_energy(scene: Scene, y: F1, row: F1) -> None:
     """Write kinetic, potential (gravity and springs), dissipated energy and work of motions."""
     bodies = scene.bodies
     kinetic, potential, dissipated = 0.0, 0.0, 0.0
-    if scene.awake.whole[0] == LISTED:
+    if scene.awake.whole[GOES] == LISTED:
         # of what sleeps
         potential = scene.awake.potential[0]
     for k in range(bodies_awake(scene)):
