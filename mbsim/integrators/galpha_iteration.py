@@ -16,6 +16,7 @@ from mbsim.integrators.newton import (
     begin,
     is_rounding,
     judge,
+    judged_by,
     linearise,
     may_help,
     note,
@@ -33,7 +34,6 @@ from mbsim.integrators.scheme import (
     LAST_STEP,
     RATE,
     RETRY,
-    TOL,
     Method,
     factor_real,
     project,
@@ -204,7 +204,7 @@ def is_off(p: Problem, m: Method, t: float, h: float) -> bool:
     e, w = m.error, m.k[D]
     for i in range(len(m.y)):
         e[i] = h * (m.k[LAST, i] - true_rate(m, i)) if is_rate(m, i) else 0.0
-    most = OFF * m.memory[TOL]
+    most = OFF * judged_by(m)
     if call_float(p.norm, (p.context, t, h, e, m.trial)) <= most:
         return False
     for i in range(len(m.y)):

@@ -22,6 +22,7 @@ from mbsim.integrators.scheme import (
     HAVE_JACOBIAN,
     JACOBIAN_TIME,
     JACOBIANS,
+    JUDGED,
     LEFT,
     LEFT_PART,
     OWN_TIME,
@@ -52,9 +53,15 @@ SMALL, REJECTIONS = 1e-4, 16
 
 
 @jitable
+def judged_by(m: Method) -> float:
+    """Return the tol by which what a step leaves of its equations is judged."""
+    return min(m.memory[TOL], m.memory[JUDGED])
+
+
+@jitable
 def target(m: Method) -> float:
     """Return how large what is left may be, in the norm of the error."""
-    tol = m.memory[TOL]
+    tol = judged_by(m)
     return max(ROUNDING, tol * min(m.memory[LEFT_PART], math.sqrt(tol)))
 
 
@@ -119,7 +126,7 @@ def judge(
         rate = quotient if rate_before == 0.0 else math.sqrt(quotient * rate_before)
         if size > goal:
             if not rate < 0.99:
-                if size <= LEFT * m.memory[TOL]:
+                if size <= LEFT * judged_by(m):
                     return SOLVED, rate_before
                 if iteration > 2 or not rate < late:
                     m.memory[RETRY] = HALF if rate < 2.0 else QUARTER
@@ -144,7 +151,7 @@ def is_rounding(p: Problem, m: Method, t: float, h: float, size: float, e: F1) -
     usual speed changes by 1e3 times what velocities are rounded by, and joints near a singular
     position round these worse: of friction counts what it can do, not what tol is.
     """
-    most = LEFT * m.memory[TOL]
+    most = LEFT * judged_by(m)
     if size <= most:
         return True
     return size <= FELT and call_float(p.norm, (p.context, t, h, e, m.y)) <= most
@@ -169,7 +176,7 @@ def is_good_enough(p: Problem, m: Method, t: float, h: float, size: float, rate:
     if stalls(m, size) and is_rounding(p, m, t, h, size, m.error):
         m.memory[GROWTH] = math.inf
         return True
-    return rate < 0.99 and size * max(1.0, rate / (1.0 - rate)) <= LEFT * m.memory[TOL]
+    return rate < 0.99 and size * max(1.0, rate / (1.0 - rate)) <= LEFT * judged_by(m)
 
 
 @jitable

@@ -112,7 +112,10 @@ RUN_END = 71
 AT_BOUND, WAIT = range(72, 74)
 # of AUTO: what part of a step that the error would allow those at the bound of stability are
 PART = 74
-MEMORY = 75
+# what Newton's iteration leaves, and f at a step's end, are judged as at this tol where tol is
+# looser
+JUDGED = 75
+MEMORY = 76
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
@@ -142,6 +145,8 @@ class Scheme(NamedTuple):
     # a step that is cut to less than this part, where a force in touch ends, tells nothing of the
     # next one, which is as long as it was meant to be
     resumes: float = 1.0
+    # the loosest tol by which it is judged what is left of a step's equations
+    judged: float = math.inf
 
 
 @tags.state
@@ -208,6 +213,7 @@ def make(scheme: Scheme, y0: Any, t0: float, kinds: Any = None, rows: int = 1) -
     memory[H_SMALLEST] = memory[GROWTH] = math.inf
     memory[FAILED_AT] = t0
     memory[LEFT_PART] = LEFT
+    memory[JUDGED] = scheme.judged
     memory[RUN_END] = -math.inf
     memory[HELD] = math.inf
     memory[ROW_ENDS] = memory[HORIZON] = memory[COSTLY] = math.inf
