@@ -50,7 +50,7 @@ from mbsim.integrators.galpha_iteration import (
     step_before,
     true_rate,
 )
-from mbsim.integrators.newton import QUARTER, as_failure, linearise, unless_singular
+from mbsim.integrators.newton import QUARTER, as_failure, linearise, unless_singular, with_ease
 from mbsim.integrators.positions import as_positions, bow, is_rate, put_along, retract
 from mbsim.integrators.scheme import (
     EVALUATIONS,
@@ -85,10 +85,6 @@ ROUGH = 1e-3
 #: And by so many times tol of what a speed changes by in an impact: its steps are the more the
 #: smaller tol is, and the impact as a whole is to be off by some tol.
 OF_IMPACT = 6.0
-#: A step that took more linearisations was hard to solve for: the next is no longer, and those
-#: behind it may grow by so much more from one to the next. Where the error lets steps grow by far
-#: more than is left of the touch or the friction they end in, each was followed by one in vain.
-EASY, EASIER = 1, 1.25
 #: The change of v' at the start is taken over this part of the first step.
 PROBE = 0.05
 
@@ -209,12 +205,6 @@ def estimate_error(p: Problem, m: Method, t: float, h: float) -> float:
 
 
 @jitable
-def grow_with_ease(m: Method, easy: bool) -> None:
-    """Let steps grow as it is easy to solve for them: not behind one that was hard, then more."""
-    m.memory[GROWTH] = max(1.0, m.memory[GROWTH]) * EASIER if easy else 1.0
-
-
-@jitable
 def attempt(p: Problem, m: Method, t: float, h: float) -> int:
     """Solve for the new point, fill trial point and error; return a code."""
     if m.memory[FRESH] == 1.0:
@@ -222,9 +212,8 @@ def attempt(p: Problem, m: Method, t: float, h: float) -> int:
         code = probe(p, m, t, h)
         if code != 0:
             return as_failure(code)
-    anew = m.counts[JACOBIANS]
-    code = solve_step(p, m, t, h)
-    grow_with_ease(m, code == 0 and m.counts[JACOBIANS] - anew <= EASY)
+    m.memory[GROWTH] = math.inf
+    code = with_ease(m, m.counts[JACOBIANS], solve_step(p, m, t, h))
     if code != 0:
         return code
     m.memory[LAST_ERROR] = estimate_error(p, m, t, h)

@@ -15,6 +15,7 @@ from mbsim.core.problem import Problem
 from mbsim.integrators.scheme import (
     CORRECTION,
     CORRECTION_BEFORE,
+    EASE,
     EVALUATIONS,
     FACTORED_STEP,
     FRESH,
@@ -35,6 +36,10 @@ from mbsim.integrators.scheme import (
     note_failure,
 )
 
+#: A step that took more linearisations was hard to solve for: the next is no longer, and those
+#: behind it may grow by so much more from one to the next. Where the error lets steps grow by far
+#: more than is left of the touch or the friction they end in, each was followed by one in vain.
+EASY, EASIER = 1, 1.25
 # what `judge` says
 GO_ON, SOLVED, HOPELESS = range(3)
 #: A step's velocities may be off by this part of its error for what f at its end is not.
@@ -155,6 +160,18 @@ def is_rounding(p: Problem, m: Method, t: float, h: float, size: float, e: F1) -
     if size <= most:
         return True
     return size <= FELT and call_float(p.norm, (p.context, t, h, e, m.y)) <= most
+
+
+@jitable
+def with_ease(m: Method, linearised: int, code: int) -> int:
+    """Let steps grow as it is easy to solve for them: not behind one that was hard, then more.
+
+    The last one began after so many linearisations, and ended with the code, which is returned.
+    """
+    easy = code == 0 and m.counts[JACOBIANS] - linearised <= EASY
+    m.memory[EASE] = max(1.0, m.memory[EASE]) * EASIER if easy else 1.0
+    m.memory[GROWTH] = min(m.memory[GROWTH], m.memory[EASE])
+    return code
 
 
 @jitable

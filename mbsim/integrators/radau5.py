@@ -39,6 +39,7 @@ from mbsim.integrators.newton import (
     linearise,
     may_help,
     unless_singular,
+    with_ease,
 )
 from mbsim.integrators.positions import is_rate, put_along
 from mbsim.integrators.scheme import (
@@ -49,6 +50,7 @@ from mbsim.integrators.scheme import (
     GROWTH,
     HAVE_JACOBIAN,
     JACOBIAN_TIME,
+    JACOBIANS,
     LAST_ERROR,
     LAST_STEP,
     LEFT,
@@ -474,7 +476,7 @@ def fit_dense(m: Method) -> None:
 def _attempt(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """One step, tried."""
     p, m = in_workspace(context)
-    return attempt(p, m, t, h)
+    return with_ease(m, m.counts[JACOBIANS], attempt(p, m, t, h))
 
 
 def _fit_dense(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:

@@ -115,7 +115,9 @@ PART = 74
 # what Newton's iteration leaves, and f at a step's end, are judged as at this tol where tol is
 # looser
 JUDGED = 75
-MEMORY = 76
+# of implicit methods: by how much steps may grow behind one that was hard to solve for
+EASE = 76
+MEMORY = 77
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
@@ -145,7 +147,8 @@ class Scheme(NamedTuple):
     # a step that is cut to less than this part, where a force in touch ends, tells nothing of the
     # next one, which is as long as it was meant to be
     resumes: float = 1.0
-    # the loosest tol by which it is judged what is left of a step's equations
+    # the loosest tol by which it is judged what is left of a step's equations, where there is
+    # friction
     judged: float = math.inf
 
 
@@ -210,10 +213,10 @@ def make(scheme: Scheme, y0: Any, t0: float, kinds: Any = None, rows: int = 1) -
     memory = np.zeros(MEMORY)
     memory[TIME] = t0
     memory[ERROR_BEFORE] = memory[OWN_TIME] = 1.0
-    memory[H_SMALLEST] = memory[GROWTH] = math.inf
+    memory[H_SMALLEST] = memory[GROWTH] = memory[EASE] = math.inf
     memory[FAILED_AT] = t0
     memory[LEFT_PART] = LEFT
-    memory[JUDGED] = scheme.judged
+    memory[JUDGED] = math.inf
     memory[RUN_END] = -math.inf
     memory[HELD] = math.inf
     memory[ROW_ENDS] = memory[HORIZON] = memory[COSTLY] = math.inf

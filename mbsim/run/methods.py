@@ -82,9 +82,12 @@ class Methods:
         # step's begin is what finds it
         touches = len(system.scene.contacts.id) > 0
         self.arrays.memory[scheme.WHERE] = 0.0 if touches else 0.5
+        dry = bool((system.scene.applied.equation >= 0).any())
+        if touches or dry:
+            self.arrays.memory[scheme.JUDGED] = self.explicit.judged
         length, speed = system.scene.world.scale[:2]
         self.arrays.memory[scheme.OWN_TIME] = length / speed
-        if system.scene.contacts.rigid.any() or (system.scene.applied.equation >= 0).any():
+        if system.scene.contacts.rigid.any() or dry:
             self.arrays.memory[scheme.LEFT_PART] = LEFT_OF_STICKING
             self.arrays.memory[scheme.HELD] = HELD_BY_STICKING
         self.problem: Problem
@@ -254,7 +257,7 @@ class Methods:
         memory[scheme.BOUNDED] = 1.0
         memory[scheme.FRESH] = 1.0
         memory[scheme.ERROR_BEFORE] = 1.0
-        memory[scheme.GROWTH] = math.inf
+        memory[scheme.GROWTH] = memory[scheme.EASE] = math.inf
         memory[scheme.BEGUN] = memory[scheme.TIME]
         work = counts[scheme.EVALUATIONS] + (counts[scheme.JACOBIANS] if stiff else 0)
         memory[scheme.BEGUN_WORK] = float(work)
