@@ -88,7 +88,7 @@ EVALUATIONS_A_STEP = 6.0
 WORTH, WORTH_AGAIN = 800, 200
 #: It is worth it for the first time as well where so many are saved, if steps at the bound go on as
 #: they do. How much longer implicit ones are the error of RECENT ones tells.
-WORTH_SMOOTH, RECENT = 100, 10.0
+WORTH_SMOOTH, RECENT = 100, 5.0
 #: At the begin, where the largest rate is measured: what is lost if it was wrong is small then.
 WORTH_AT_ONCE = 4000
 #: With so many ahead the implicit method is tried after as many steps as there is patience for.

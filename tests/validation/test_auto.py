@@ -114,6 +114,17 @@ def test_a_short_run_changes_over_where_radau5_takes_far_less(name):
     assert work < 0.7 * explicit["rhs_evaluations"]
 
 
+@pytest.mark.parametrize("tol", [1e-3, 1e-4, 1e-5])
+def test_the_error_of_the_last_few_steps_at_the_bound_tells_how_long_others_would_be(tol):
+    """That of the start counted for long: it was found stiff after 49 to 96 steps, and too late."""
+    model = mbsim.read_model(MODELS / "sliding_block.xml")
+    auto, stiff = (
+        mbsim.simulate(model, integrator=method, tol=tol).stats for method in ("AUTO", "RADAU5")
+    )
+    assert auto["rhs_evaluations"] - auto["implicit_evaluations"] < 6 * 45
+    assert auto["steps"] == stiff["steps"]
+
+
 @pytest.mark.parametrize(("name", "part"), [("torsion_top", 0.05), ("bushing_chain", 0.4)])
 def test_radau5_takes_steps_for_which_newtons_iteration_converges(name, part):
     stats = mbsim.simulate(mbsim.read_model(STIFF / f"{name}.xml"), integrator="RADAU5").stats
