@@ -124,11 +124,11 @@ def is_bounded(m: Method) -> bool:
 @jitable
 def bound_next(m: Method, h: float, error: float) -> None:
     """Let the explicit step after one of length h and this error keep to the bound if it has to."""
-    note_bound(m, error)
+    note_bound(m, h, error)
     if is_bounded(m):
-        stay_within(m, h, error)
+        stay_within(m)
     elif m.memory[KEEPS_TO_BOUND] == 1.0:
-        keep_to_bound(m, h, error)
+        keep_to_bound(m, error)
 
 
 @jitable

@@ -347,5 +347,6 @@ SCHEME = Scheme(
     order=8.0,
     memory=0.2,
     carried=3,
+    longer=1.3,
     watched=DIFFERENCES + RATES,
 )

@@ -117,7 +117,10 @@ PART = 74
 JUDGED = 75
 # of implicit methods: by how much steps may grow behind one that was hard to solve for
 EASE = 76
-MEMORY = 77
+# of an explicit method: the longest next step within the bound of stability, as its last ones tell,
+# and by how much it may be longer than what was told a step before
+LONGEST, LONGER = range(77, 79)
+MEMORY = 79
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
@@ -150,6 +153,8 @@ class Scheme(NamedTuple):
     # the loosest tol by which it is judged what is left of a step's equations, where there is
     # friction
     judged: float = math.inf
+    # of an explicit one: by how much steps may grow that come behind one at its bound (`stability`)
+    longer: float = math.inf
 
 
 @tags.state
@@ -217,6 +222,7 @@ def make(scheme: Scheme, y0: Any, t0: float, kinds: Any = None, rows: int = 1) -
     memory[FAILED_AT] = t0
     memory[LEFT_PART] = LEFT
     memory[JUDGED] = math.inf
+    memory[LONGEST], memory[LONGER] = math.inf, scheme.longer
     memory[RUN_END] = -math.inf
     memory[HELD] = math.inf
     memory[ROW_ENDS] = memory[HORIZON] = memory[COSTLY] = math.inf

@@ -25,6 +25,8 @@ from mbsim.integrators.scheme import (
     EVALUATIONS,
     FREE,
     LAST_ERROR,
+    LONGER,
+    LONGEST,
     OWN_TIME,
     PACE_FREE,
     PACE_WITHIN,
@@ -51,14 +53,18 @@ NOTHING = 1e-10
 #: is that which bounds them, and windows until the other kind is tried: from steps beyond the bound
 #: soon, for motions that stick and slip in turn look like others for a while. What steps beyond it
 #: shake, in vain, takes some windows to come to rest: each time it is tried half as often; where it
-#: paid, at once.
-WINDOW, STIFF_PART, SOON, FIRST = 250, 0.1, 12.0, 16.0
+#: paid, at once. But after MOST windows, of which one in vain is less than half a percent: models
+#: change, and what was in vain may pay now.
+WINDOW, STIFF_PART, SOON, FIRST, MOST = 250, 0.1, 12.0, 16.0, 256.0
 #: Steps within the bound are taken though they go by so much less far: they shake nothing.
 CALMER = 0.5
 
 #: The most of tol for steps within the bound, and for how many of them one at the bound says so:
 #: what trembles shows its rate now and then.
 CALM, REMEMBERED = 1e-3, 40.0
+
+#: Where the bound is so many times as long as it was, what set it has let go, as an impact does.
+GONE = 20.0
 
 #: From so many times the change of f over a step, between its last two stages, a rate is hidden,
 #: if the estimate is below what shows it and the error, over the allowed one, bounds the step.
@@ -125,22 +131,31 @@ def allowed(m: Method) -> float:
 
 
 @jitable
-def note_bound(m: Method, error: float) -> None:
-    """Remember a step of this error that was at the bound of stability, and forget earlier ones."""
+def note_bound(m: Method, h: float, error: float) -> None:
+    """Remember a step of length h and this error that was at the bound, and forget earlier ones.
+
+    What has come to rest shows a lower rate than it has. A step three times as long, which DOP853
+    amplifies by up to 1e5, would then throw what the last ones have damped: so its steps grow by
+    less behind one at the bound. DOPRI5 amplifies by 1e3, and goes farther with steps that are
+    beyond the bound now and then.
+    """
     if m.memory[STIFFNESS] > BOUND and error > NOTHING:
         m.memory[AT_BOUND] = REMEMBERED
     else:
         m.memory[AT_BOUND] = max(0.0, m.memory[AT_BOUND] - 1.0)
+    shown, known = math.inf, math.inf
+    if m.memory[STIFFNESS] > 0.0:
+        # a step is no more than halved, for a kink looks like a high rate
+        shown = max(0.5, WITHIN / m.memory[STIFFNESS]) * h
+    if m.memory[AT_BOUND] > 0.0 and shown < GONE * m.memory[LONGEST]:
+        known = m.memory[LONGER] * m.memory[LONGEST]
+    m.memory[LONGEST] = min(known, shown if error > NOTHING else math.inf)
 
 
 @jitable
-def stay_within(m: Method, h: float, error: float) -> None:
-    """Let the step after one of length h and this error end within the bound of stability.
-
-    A step is no more than halved, for a kink looks like a high rate.
-    """
-    if m.memory[STIFFNESS] > 0.0 and error > NOTHING:
-        m.memory[STEP] = min(m.memory[STEP], max(0.5, WITHIN / m.memory[STIFFNESS]) * h)
+def stay_within(m: Method) -> None:
+    """Let the next step end within the bound of stability."""
+    m.memory[STEP] = min(m.memory[STEP], m.memory[LONGEST])
 
 
 @jitable
@@ -159,20 +174,21 @@ def judge_window(m: Method) -> None:
     m.memory[PACE_FREE if m.memory[FREE] == 1.0 else PACE_WITHIN] = pace
     m.memory[WINDOWS] += 1.0
     if m.memory[WINDOW_STIFF] < STIFF_PART * m.memory[WINDOW_STEPS]:
-        # the error bounds them: nothing that was found holds any more
+        # the error bounds them: nothing that was found of paces holds any more. How long to wait
+        # does: what sticks and slips in turn comes back
         m.memory[PACE_FREE] = m.memory[PACE_WITHIN] = m.memory[FREE] = m.memory[WINDOWS] = 0.0
     elif m.memory[WINDOWS] >= (SOON if m.memory[FREE] == 1.0 else m.memory[WAIT]):
         m.memory[FREE], m.memory[WINDOWS] = 1.0 - m.memory[FREE], 0.0
     else:
         within = m.memory[PACE_WITHIN] >= CALMER * m.memory[PACE_FREE]
         if m.memory[FREE] == 1.0:
-            m.memory[WAIT] = max(FIRST, 2.0 * m.memory[WAIT]) if within else 1.0
+            m.memory[WAIT] = min(MOST, max(FIRST, 2.0 * m.memory[WAIT])) if within else 1.0
         m.memory[FREE] = 0.0 if within else 1.0
 
 
 @jitable
-def keep_to_bound(m: Method, h: float, error: float) -> None:
-    """Let the step after one of length h and this error keep to the bound, where that pays."""
+def keep_to_bound(m: Method, error: float) -> None:
+    """Let the step after one of this error keep to the bound, where that pays."""
     if m.memory[WINDOW_WORK] == 0.0:
         begin_window(m)
         m.memory[WAIT] = FIRST
@@ -180,7 +196,7 @@ def keep_to_bound(m: Method, h: float, error: float) -> None:
     if m.memory[STIFFNESS] > BOUND and error > NOTHING:
         m.memory[WINDOW_STIFF] += 1.0
     if m.memory[FREE] == 0.0:
-        stay_within(m, h, error)
+        stay_within(m)
     if m.counts[EVALUATIONS] - m.memory[WINDOW_WORK] >= WINDOW:
         judge_window(m)
         begin_window(m)
