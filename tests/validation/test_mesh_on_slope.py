@@ -15,7 +15,8 @@ def test_it_does_not_jitter_and_is_held(depth, friction, tmp_path):
     run = run_deck(tmp_path, slope(depth, friction), 1.0, 0.02)
     late = run["time"] > 0.6
     assert abs(run["bodies/2/angular_velocity"][late]).max() < 1e-6
-    assert run["contacts/301/force"][-1, 2] == pytest.approx(9.81 * np.cos(ANGLE), rel=1e-6)
+    # 4e-11 m of the depth, of 1e-5 m; tol is 1e-5
+    assert run["contacts/301/force"][-1, 2] == pytest.approx(9.81 * np.cos(ANGLE), rel=1e-5)
     if friction == "STICTION":
         x = run["bodies/2/position"][late]
         assert np.ptp(x, axis=0).max() < 1e-8
