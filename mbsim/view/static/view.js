@@ -65,7 +65,7 @@ mbsim.View = (function () {
         this.stage.scene.add(group);
         return group;
       });
-      if (!before && first.shapes.triangles > 4e6) { this.on.shadows = false; }
+      if (!before && (mbsim.lit.slow || first.shapes.triangles > 4e6)) { this.on.shadows = false; }
       this.describe();
       if (before) {
         this.curves.runs = this.runs;
@@ -427,9 +427,8 @@ mbsim.View = (function () {
     // Draw one frame; the time that the script takes is remembered.
     draw() {
       const began = performance.now();
-      const shadows = this.on.shadows && !this.stage.coarse;
-      this.stage.renderer.shadowMap.enabled = shadows;
-      this.stage.sun.castShadow = shadows;
+      this.stage.renderer.shadowMap.enabled = this.on.shadows;
+      this.stage.sun.castShadow = this.on.shadows;
       this.stage.ground.visible = this.on.ground;
       this.runs.forEach((run, k) => {
         this.groups[k].visible = k === 0 || this.on.second;
