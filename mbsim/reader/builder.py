@@ -7,6 +7,7 @@ markers are made where a place is given beside bodies.
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
@@ -42,6 +43,8 @@ from mbsim.reader.written import written
 _CALLS = calls()
 _CG = "cg_id"
 _Z_AXIS = "z_axis"
+# control characters but blanks, halves of characters, and what XML 1.0 leaves out beside them
+_NOT_IN_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 _PARALLEL = 0.9  # |cosine| beyond which the marker's x-axis is not taken from global x
 
 
@@ -247,6 +250,11 @@ class Model:
         node = Node(statement.name, 0)
         file, node.line = _caller()
         node.attributes = [Attribute(name, text, node.line) for name, text in texts(statement, own)]
+        for attribute in node.attributes:
+            if found := _NOT_IN_XML.search(attribute.value):
+                raise ModelError(
+                    f"{statement.name}: {attribute.name}: {found[0]!r} has no place in XML"
+                )
         for name, value in given.items():
             if fold(name) in children and value is not None:
                 text = written(np.asarray(value).ravel())

@@ -230,6 +230,12 @@ def test_a_mesh_is_written_from_arrays():
         (lambda m: (m.body(id=3, mass=1), m.body(id=3, mass=1)), DeckError, "already used"),
         (lambda m: m.Force_Contact, AttributeError, "Force_Contact is .contact"),
         (lambda m: m.change(m.ground, foo=1), ModelError, "Body_Rigid has no attribute foo"),
+        (
+            lambda m: m.body(mass=1, label="a\x07b"),
+            ModelError,
+            "label: '\\x07' has no place in XML",
+        ),
+        (lambda m: m.body(mass=1, label="\ud800"), ModelError, "has no place in XML"),
         (lambda m: m.change(3, mass=1), ModelError, "an element of this model; int given"),
         (
             lambda m: m.joint("FIXED", mbsim.Model().ground, m.ground),
