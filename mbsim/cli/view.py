@@ -176,11 +176,7 @@ class _Asked:
             scenes = [read_scene(stack.enter_context(open_results(file))) for file in self.files]
             model = glb(scenes[0]) if self.gltf is not None else b""
             packs = packs_of(scenes, self.signals)
-            # the script is told whole names
-            names = [each for name in self.signals for each in scenes[0].results.find(name)]
-            settings: dict[str, object] = {"signals": names}
-            if self.rest["theme"]:
-                settings["theme"] = self.rest["theme"]
+            settings = {"theme": self.rest["theme"]} if self.rest["theme"] else {}
             return page(title_of(scenes), settings, packs), packs, model
 
 

@@ -47,9 +47,18 @@ def scripts() -> str:
 
 
 def packs_of(scenes: Sequence[Scene], asked: Sequence[str] = ()) -> list[RunData]:
-    """Return the packs of runs that are shown over each other, in the units of the first."""
+    """Return the packs of runs that are shown over each other, in the units of the first.
+
+    `asked` are names or patterns of signals of the first run, whose curves are shown first;
+    `UnknownSignal` is raised where it has none.
+    """
     shown, room = scenes[0].units, ROOM // len(scenes)
-    return [run_data(scene, room, asked, shown) for scene in scenes]
+    names = [each for name in asked for each in scenes[0].results.find(name)]
+    # another model need not have them
+    return [
+        run_data(scene, room, [name for name in names if name in scene.results], shown)
+        for scene in scenes
+    ]
 
 
 def pack_elements(packs: Sequence[RunData]) -> str:
@@ -90,7 +99,7 @@ def page(
     title : str
         Of the page; what comes from decks is escaped here.
     settings : mapping
-        What the script is told: `signals`, `theme`, `live`.
+        What the script is told: `theme`, `live`.
     packs : sequence of RunData
         Runs that are within the page.
     connect : str

@@ -78,9 +78,8 @@ def _motion(results: Results, told: list[str]) -> str:
         return f"<p>{escape(str(error))}</p>"
     packs = packs_of([scene])
     told += packs[0].warnings
-    settings = "{}"
     return (
-        f'<div class="mbsim-view framed folded" id="view" data-settings="{settings}">'
+        f'<div class="mbsim-view framed folded" id="view" data-settings="{{}}">'
         f'{static("body.html")}</div>\n<div class="strip" id="strip"></div>\n'
         f"{pack_elements(packs)}"
     )

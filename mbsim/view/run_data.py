@@ -91,7 +91,7 @@ def run_data(
     taken = len(pack(about, arrays)) * 4 // 3
     curves = channels(scene, max(room - taken, 100_000), asked, shown)
     arrays |= curves.arrays
-    about["channels"] = curves.about
+    about["channels"], about["asked"] = curves.about, list(asked)
     about["left_out"] = curves.left_out
     about["error"] = off
     about["rows"], about["rows_of_file"] = len(rows), len(scene.time)
@@ -199,7 +199,7 @@ def _about(scene: Scene, shown: UnitSystem) -> dict[str, Any]:
             "length": units.factor_to(shown, POSITION),
             "time": units.factor_to(shown, TIME),
         },
-        "shown": {"position": shown.text(POSITION), "time": shown.text(TIME)},
+        "shown": {"position": shown.text(POSITION)},
         "second": 1.0 / shown.factor_to(UnitSystem(), TIME),
         "gravity": scene.gravity.tolist(),
         "up": scene.up.tolist(),

@@ -83,8 +83,7 @@ class Served:
 
     def document(self) -> str:
         """Return the page."""
-        settings = {"live": True, "signals": self.asked}
-        return page(self.title, settings, connect="'self'")
+        return page(self.title, {"live": True}, connect="'self'")
 
 
 def server(served: Served, port: int = 0) -> ThreadingHTTPServer:

@@ -101,9 +101,20 @@ def test_a_page_knows_how_long_a_second_is(tmp_path, unit, second):
 
 def test_a_curve_that_is_not_there_is_refused(scene):
     with pytest.raises(UnknownSignal, match="no signal 'nope'"):
-        run_data(scene, asked=["nope"])
-    about, _ = unpack(run_data(scene, asked=["bodies/*/velocity"]).data)
+        packs_of([scene], ["nope"])
+    about, _ = unpack(packs_of([scene], ["bodies/*/velocity"])[0].data)
     assert about["channels"][0]["name"] == "bodies/2/velocity/x"
+    assert about["asked"][0] == "bodies/2/velocity"
+
+
+def test_a_second_run_need_not_have_the_curves_that_are_asked_for(scene, tmp_path):
+    with open_results(falling(tmp_path / "run")) as other:
+        packs = packs_of([scene, read_scene(other)], ["contacts/*/force", "bodies/2/velocity"])
+        with pytest.raises(UnknownSignal, match="contacts"):
+            packs_of([read_scene(other), scene], ["contacts/*/force"])
+    asked = [unpack(pack.data)[0]["asked"] for pack in packs]
+    assert asked[1] == ["bodies/2/velocity"]
+    assert len(asked[0]) > 1
 
 
 def test_magnitudes_of_a_long_run_are_packed(tmp_path):

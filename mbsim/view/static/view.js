@@ -88,7 +88,7 @@ mbsim.View = (function () {
 
     firstCurves() {
       const names = this.runs[0].names();
-      const wanted = this.settings.signals || [];
+      const wanted = this.runs[0].about.asked;
       const guess = [names.find((n) => /^contacts\/\d+\/force\/mag$/.test(n)), names.find((n) => n === "energy/kinetic")];
       const asked = names.filter((name) => wanted.some((each) => name === each || name.startsWith(each + "/")));
       for (const name of asked.length ? asked.slice(0, 8) : guess.filter(Boolean)) { this.curves.add(name); }
