@@ -268,3 +268,14 @@ def test_a_kinematic_analysis_of_what_forces_move_is_refused(name, said):
     model = mbsim.read_model(text.replace('analysis_type="Transient"', 'analysis_type="Kinematic"'))
     with pytest.raises(ModelError, match=said):
         mbsim.simulate(model)
+
+
+def test_a_kinematic_analysis_of_an_adams_deck_is_refused_in_its_words(tmp_path):
+    (tmp_path / "falls.adm").write_text(
+        "falls\nPART/1, GROUND\nMARKER/10, PART=1\nPART/2, MASS=1, CM=20, IP=1,1,1\n"
+        "MARKER/20, PART=2\nACCGRAV/KGRAV=-9.81\nUNITS/FORCE=NEWTON, MASS=KILOGRAM, "
+        "LENGTH=METER, TIME=SECOND\nEND\n"
+    )
+    (tmp_path / "falls.acf").write_text("falls\n\nSIMULATE/KINEMATICS, END=1, STEPS=10\nSTOP\n")
+    with pytest.raises(ModelError, match=r"SIMULATE/KINEMATICS: degrees of freedom: 6.*let DYN"):
+        mbsim.simulate(mbsim.read_model(tmp_path / "falls.acf"))
