@@ -97,7 +97,7 @@ class Awake(NamedTuple):
     # (2,) LISTED, or else it is everything; how many rows of `part`: the running method's own
     whole: tags.State[I1]
     part: I2  # (nb + 1, 2) begin and end of numbers of y that do not belong to what sleeps
-    count: I1  # type: ignore[assignment]  # (2,) bodies and graphics
+    count: I1  # type: ignore[assignment]  # hides a method of tuples; (2,) bodies and graphics
     body: I1  # (nb,) that do not sleep, ascending
     graphic: I1  # (ng,) theirs
     loadable: tags.Constant[I1]  # bodies on which applied forces may act, asleep or not

@@ -101,12 +101,13 @@ class _Asked:
         mp4: Path | None,
         gltf: Path | None,
         size: str,
-        **rest: object,
+        time: float | None,
+        speed: float | None,
+        theme: str | None,
     ) -> None:
         self.files, self.output, self.signals, self.port = files, output, signals, port
         self.png, self.gif, self.mp4, self.gltf = png, gif, mp4, gltf
-        self.size = _size(size)
-        self.rest = rest
+        self.size, self.time, self.speed, self.theme = _size(size), time, speed, theme
 
     def serve(self) -> None:
         """Serve the page until Ctrl-C."""
@@ -151,11 +152,10 @@ class _Asked:
             write_product(self.gltf, model, *_GLTF)
             echo(f"{self.gltf}: {said_size(self.gltf)}")
         if any(pictures.values()):
-            time, speed = self.rest["time"], self.rest["speed"]
             bar = CountBar("pictures") if sys.stderr.isatty() and (self.gif or self.mp4) else None
             update = bar.update if bar else None
             try:
-                make(text, self.size, **pictures, time=time, speed=speed, progress=update)  # type: ignore[arg-type]
+                make(text, self.size, **pictures, time=self.time, speed=self.speed, progress=update)
             finally:
                 if bar is not None:
                     bar.stop()
@@ -176,7 +176,7 @@ class _Asked:
             scenes = [read_scene(stack.enter_context(open_results(file))) for file in self.files]
             model = glb(scenes[0]) if self.gltf is not None else b""
             packs = packs_of(scenes, self.signals)
-            settings = {"theme": self.rest["theme"]} if self.rest["theme"] else {}
+            settings = {"theme": self.theme} if self.theme else {}
             return page(title_of(scenes), settings, packs), packs, model
 
 

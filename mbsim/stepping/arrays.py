@@ -193,7 +193,7 @@ class Rest(NamedTuple):
 
     body: I2  # (nb, 4)
     since: F1  # (nb,) when a body that is still became so
-    count: I1  # type: ignore[assignment]  # (REST_COUNTS,)
+    count: I1  # type: ignore[assignment]  # hides a method of tuples; (REST_COUNTS,)
     net: F2  # (nc, 3) force of each contact between what sleeps
     grounded: I1  # (groups,) 1 where ground presses on a body of a group that sleeps
     parent: tags.Scratch[I1]  # (nb,) an earlier body of the same island
