@@ -6,6 +6,7 @@ import re
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -71,7 +72,9 @@ _GLTF = "glTF model", "--gltf"
 @click.option(
     "--theme", type=click.Choice(["light", "dark"]), help="Of the page.  [default: the reader's]"
 )
-def command(files: tuple[Path, ...], output: Path | None, serve: bool, **options: object) -> None:
+def command(
+    files: tuple[Path, ...], output: Path | None, serve: bool, size: str, **options: object
+) -> None:
     """Write the motion of RESULT.h5 as one HTML page that any browser shows, without a network.
 
     Two result files are shown over each other, in the units of the first.
@@ -80,34 +83,32 @@ def command(files: tuple[Path, ...], output: Path | None, serve: bool, **options
 
     if len(files) > 2:
         raise ModelError("one or two result files are shown, the second over the first")
-    asked = _Asked(files, output, **options)  # type: ignore[arg-type]
+    asked = _Asked(files, output, size=_size(size), **options)  # type: ignore[arg-type]
     if serve:
         asked.serve()
     else:
         asked.write()
 
 
+@dataclass
 class _Asked:
     """What the options ask for."""
 
-    def __init__(
-        self,
-        files: tuple[Path, ...],
-        output: Path | None,
-        signals: tuple[str, ...],
-        port: int | None,
-        png: Path | None,
-        gif: Path | None,
-        mp4: Path | None,
-        gltf: Path | None,
-        size: str,
-        time: float | None,
-        speed: float | None,
-        theme: str | None,
-    ) -> None:
-        self.files, self.output, self.signals, self.port = files, output, signals, port
-        self.png, self.gif, self.mp4, self.gltf = png, gif, mp4, gltf
-        self.size, self.time, self.speed, self.theme = _size(size), time, speed, theme
+    files: tuple[Path, ...]
+    output: Path | None
+    signals: tuple[str, ...]
+    port: int | None
+    png: Path | None
+    gif: Path | None
+    mp4: Path | None
+    gltf: Path | None
+    #: Width and height of pictures [pixels].
+    size: tuple[int, int]
+    #: Of the picture [time units of the result].
+    time: float | None
+    #: Times real time.
+    speed: float | None
+    theme: str | None
 
     def serve(self) -> None:
         """Serve the page until Ctrl-C."""
