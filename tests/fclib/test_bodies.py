@@ -124,6 +124,8 @@ def test_arrays_in_and_impulses_out():
     assert none[0] == 0.0
 
 
+# bodies of three unknowns are compiled for this test alone: half a minute
+@pytest.mark.slow
 def test_bodies_in_the_plane_have_three_unknowns():
     problem, *_ = pile(40, 110, 2, seed=4, size=3)
     assert len(reduce(problem).rigid[1].number) == 40
