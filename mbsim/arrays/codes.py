@@ -93,7 +93,7 @@ C1, C2, C3, FORM = range(4)
 TURN_LOCKED, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT = range(5)
 
 # kinds of terms: `Equations.kind`
-OFFSET, PERP, ANGLE, DISTANCE, GENERAL, TOUCHING, TWIST = range(7)
+OFFSET, PERP, ANGLE, DISTANCE, GENERAL, TOUCHING, TWIST, CURVE = range(8)
 
 # entries of `Sweep.quality`: when equations were chosen last, the largest of those, and whether
 # the committed state is near a position in which a loop can fold; how far the last step left

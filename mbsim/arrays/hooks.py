@@ -51,7 +51,7 @@ class Hook(IntEnum):
     PASSING = 27  # how long pairs of meshes that touch pass through no wall
     FCL_POINTS = 28  # what follows from points that FCL found: `FclPoints`
     DRY = 29  # what Force_DryFriction and Force_Element keep of a step: `Dry`
-    ANGLES = 30  # turns of followed angles
+    ANGLES = 30  # turns of followed angles, ways along curves
     NEAR = 31  # the lists of near pairs
     REQUESTS = 32  # expressions of requests
     STEPPING = 33  # no hook: where the packed arrays of `stepping.arrays` are

@@ -108,6 +108,23 @@ class Angles(NamedTuple):
 
 
 @tags.constant
+class Curves(NamedTuple):
+    """Curves on which points of other bodies are held: pieces of degree 5 in a parameter u.
+
+    On piece k, u from begin[k] on, x = sum_n coefficient[k, n] (u - begin[k])^n in J's axes.
+    """
+
+    first: I1  # (curves + 1,) first piece of each
+    begin: F1  # (pieces,)
+    length: F1  # (pieces,) by how much u grows on it
+    coefficient: F3  # (pieces, 6, 3)
+    closed: I1  # (curves,) 1 where it goes on at its begin
+    i: I1  # (curves,) markers: whose origin is held, and in whose axes the curve is given
+    j: I1  # (curves,)
+    equation: I1  # (curves,) the first of the two that hold it
+
+
+@tags.constant
 class Programs(NamedTuple):
     """Expressions as instructions of a stack machine."""
 
@@ -281,9 +298,10 @@ class Equations(NamedTuple):
     kind: I1  # (terms,)
     i: I1  # (terms,) markers
     j: I1  # (terms,)
-    axis: I2  # (terms, 2) of I and of J; of TOUCHING 0 or 1 for x or y, and the slot
+    # (terms, 2) of I and of J; of TOUCHING 0 or 1 for x or y, and the slot; of CURVE 0 or 1
+    axis: I2
     factor: F1  # (terms,)
-    angle: I1  # (terms,) row of `Angles`, -1 for none
+    angle: I1  # (terms,) row of `Angles`, of CURVE one of `Curves`, -1 for none
     active: tags.State[I1]  # (ne + 1,) equations in use, ascending, their number last
 
 

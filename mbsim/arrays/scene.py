@@ -25,6 +25,7 @@ from mbsim.arrays.model import (
     Bodies,
     Connections,
     Contacts,
+    Curves,
     Equations,
     Graphics,
     Kinds,
@@ -56,6 +57,7 @@ class Scene(NamedTuple):
     slots: Slots
     markers: Markers
     angles: Angles
+    curves: Curves
     programs: Programs
     states: States
     sensors: Sensors

@@ -51,6 +51,7 @@ _STATEMENTS = {
     "COUPLER": "Constraint_Coupler",
     "MOTION": "Motion_Joint",
     "GCON": "Constraint_General",
+    "PTCV": "Constraint_PTCV",
 }
 
 
@@ -334,6 +335,7 @@ def _scene(
         slots=contacts.slots,
         markers=markers,
         angles=angles,
+        curves=mechanism.curves,
         programs=_programs(model, acts, contact_ids),
         states=acts.states,
         sensors=acts.sensors,
@@ -346,7 +348,7 @@ def _scene(
         connections=mechanism.connections,
         world=_world(acts, judged, accumulators),
         scales=_group_scales(judged.groups),
-        state=start_state(n, contacts.graphics, table.start_angles(), residuals),
+        state=start_state(n, contacts.graphics, table.start_angles(), mechanism.along, residuals),
         awake=awake(n, contacts.graphics, _loadable(acts, markers.body, n.bodies)),
         log=empty_log(n.contacts),
         audit=audit(

@@ -15,8 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from mbsim.arrays import codes
-from mbsim.arrays.model import Connections, Equations, Tree
+from mbsim.arrays.model import Connections, Curves, Equations, Tree
 from mbsim.arrays.scratch import Sweep
+from mbsim.compile_model.curves import CurveTable
 from mbsim.compile_model.equation_sums import Sums
 from mbsim.compile_model.markers import MarkerTable
 from mbsim.compile_model.programs import ProgramTable
@@ -31,7 +32,15 @@ from mbsim.compile_model.tree import (
 from mbsim.errors import DeckError, Fault
 from mbsim.forces.catalog import ForceKind, Switched
 from mbsim.joints.catalog import JOINTS, Row, angle, offset
-from mbsim.model.elements import Coupler, GeneralConstraint, Joint, MarkerForce, Model, Motion
+from mbsim.model.elements import (
+    Coupler,
+    GeneralConstraint,
+    Joint,
+    MarkerForce,
+    Model,
+    Motion,
+    PointOnCurve,
+)
 from mbsim.model.forces import rigid_forces
 from mbsim.model.frames import quaternion
 from mbsim.model.names import element_name
@@ -44,8 +53,7 @@ _KINDS = {
     "distance": codes.DISTANCE,
     "twist": codes.TWIST,
 }
-#: A joint that holds less than this is cheaper as equations than as a joint of the tree of the
-#: tree.
+#: A joint that holds less than this is cheaper as equations than as a joint of the tree.
 _LEAST_ROWS = 3
 #: Sine of an angle below which axes are parallel.
 _PARALLEL = 1e-6
@@ -78,6 +86,8 @@ class Mechanism:
     connections: Connections
     elements: list[tuple[str, int]]
     names: list[str]
+    curves: Curves
+    along: np.ndarray  # (curves,) parameters at the start
 
 
 class RigidSlot(NamedTuple):
@@ -96,6 +106,7 @@ class _Builder:
         self.model, self.markers, self.programs = model, markers, programs
         self.length = markers.length
         self.sums = Sums()
+        self.curves = CurveTable()
         self.elements: list[tuple[str, int]] = []
         self.pairs: list[tuple[int, int]] = []
         self.tree_joints: dict[int, TreeJoint] = {}
@@ -258,6 +269,21 @@ class _Builder:
             self.sums.terms.append((codes.GENERAL, row, 0, 0, 0, 1.0, -1))
         self.sums.close(connection, "its expression", 0.0, self.length, program, general=1)
 
+    def add_point_on_curve(self, point: PointOnCurve) -> None:
+        """Add a point that stays on a curve: two equations, across it."""
+        i, j = self.markers.row(point.i_marker_id), self.markers.row(point.j_marker_id)
+        connection = self.connect("PTCV", point.id, i, j)
+        p, R = self.markers.frame(j)
+        near, _ = self.markers.frame(i)
+        if point.start is not None:
+            seen_from, axes = self.markers.frame(self.markers.row(point.start_marker_id))
+            near = seen_from + axes @ np.array(point.start)
+        curve, first = self.model.curves[point.curve_id], len(self.sums.program)
+        row = self.curves.add(curve, i, j, R.T @ (near - p), first)
+        for which, name in enumerate(("first offset across the curve", "second offset across it")):
+            self.sums.terms.append((codes.CURVE, i, j, which, 0, 1.0, row))
+            self.sums.close(connection, name, 0.0, self.length)
+
     def add_rigid_force(self, kind: ForceKind, force: MarkerForce) -> None:
         """Add the velocity that a rigid force holds while it sticks; it is no connection."""
         i, j = self.markers.row(force.i_marker_id), self.markers.row(force.j_marker_id)
@@ -403,6 +429,8 @@ def constrain(
         builder.add_motion(motion)
     for constraint in model.general_constraints.values():
         builder.add_general(constraint)
+    for point in model.points_on_curves.values():
+        builder.add_point_on_curve(point)
     # friction is held by none of the tree, and its equations are the last
     rigid = rigid_forces(model)
     held = [marker for _, f in rigid for marker in (f.i_marker_id, f.j_marker_id)]
@@ -422,7 +450,14 @@ def constrain(
         tree=np.array([hung.get(c, (-1, False))[0] for c in range(n)], dtype=np.int64),
         flip=np.array([hung.get(c, (-1, False))[1] for c in range(n)], dtype=np.int64),
     )
-    return Mechanism(tree, builder.sums.arrays(), connections, builder.elements, builder.sums.names)
+    return Mechanism(
+        tree,
+        builder.sums.arrays(),
+        connections,
+        builder.elements,
+        builder.sums.names,
+        *builder.curves.arrays(),
+    )
 
 
 def sweep(mechanism: Mechanism) -> Sweep:

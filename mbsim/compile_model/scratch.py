@@ -47,7 +47,11 @@ class Sizes:
 
 
 def start_state(
-    n: Sizes, graphics: Graphics, angle: np.ndarray[Any, Any], residuals: Residuals
+    n: Sizes,
+    graphics: Graphics,
+    angle: np.ndarray[Any, Any],
+    along: np.ndarray[Any, Any],
+    residuals: Residuals,
 ) -> State:
     """Return the incident table before anything touched."""
     nb, ng, ns, memory = n.bodies, len(graphics.body), n.slots, n.memory
@@ -64,6 +68,7 @@ def start_state(
         since=np.zeros(1),
         centre=np.zeros((ng, 3)),
         angle=angle,
+        along=along,
         touching=np.zeros(ns, dtype=np.int64),
         p=np.zeros((ns, 3)),
         n=np.zeros((ns, 3)),

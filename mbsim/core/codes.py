@@ -28,6 +28,7 @@ class Code(IntEnum):
     SINGULAR = 51  # `factor`: there is no solution, or too many
     STOPPED_BY_USER = 100
     NOT_REPEATED = 101  # f at a point differs each time it is asked for
+    END_OF_CURVE = 102  # a point that a curve holds has come to where that ends
 
 
 #: Codes from here on end the run without another try.

@@ -267,6 +267,7 @@ def _element(kind: str, **about: str) -> None:
 _element("JOINT", JOINT="reaction of a joint on I (jflag 0) or on J (jflag 1)")
 _element("JPRIM", JPRIM="of a joint primitive")
 _element("MOTION", MOTION="of a motion")
+_element("PTCV", PTCV="of a curve on the point that it holds")
 for _name in FORCES:
     _about = f"of a {FORCES[_name].statement}"
     _element(_name, **dict.fromkeys(FORCES[_name].functions.split(), _about))

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from mbsim.expressions import Expression
 from mbsim.forces.catalog import FORCES
+from mbsim.model.curves import ParamCurve, PointOnCurve
 from mbsim.model.forces import (
     BodyForce,
     ForceElement,
@@ -52,6 +53,8 @@ __all__ = [
     "MarkerForce",
     "Model",
     "Motion",
+    "ParamCurve",
+    "PointOnCurve",
     "Request",
     "ScalarForce",
     "Sensor",
@@ -434,6 +437,7 @@ class Model:
     couplers: dict[int, Coupler] = field(default_factory=dict)
     motions: dict[int, Motion] = field(default_factory=dict)
     general_constraints: dict[int, GeneralConstraint] = field(default_factory=dict)
+    points_on_curves: dict[int, PointOnCurve] = field(default_factory=dict)
     scalar_forces: dict[int, ScalarForce] = field(default_factory=dict)
     marker_forces: dict[str, dict[int, MarkerForce]] = field(default_factory=dict)  # by kind
     vector_forces: dict[int, VectorForce] = field(default_factory=dict)
@@ -444,6 +448,7 @@ class Model:
     variables: dict[int, Variable] = field(default_factory=dict)
     differentials: dict[int, Differential] = field(default_factory=dict)
     splines: dict[int, Spline] = field(default_factory=dict)
+    curves: dict[int, ParamCurve] = field(default_factory=dict)
     arrays: dict[int, ArrayOfNumbers] = field(default_factory=dict)
     sensors: dict[int, Sensor] = field(default_factory=dict)
     evaluations: dict[int, Evaluation] = field(default_factory=dict)

@@ -19,6 +19,7 @@ STATEMENTS = {
     "JOINT": "Constraint_Joint",
     "JPRIM": "Constraint_Jprim",
     "MOTION": "Motion_Joint",
+    "PTCV": "Constraint_PTCV",
     **{name: FORCES[name].statement for name in FORCES},
     "CONTACT": "Force_Contact",
     "VARIABLE": "Reference_Variable",
@@ -37,7 +38,13 @@ _LEVERS = {
 }
 
 #: Attributes that name markers.
-_MARKERS = ("i_marker_id", "j_marker_id", "j_floating_marker_id", "ref_marker_id")
+_MARKERS = (
+    "i_marker_id",
+    "j_marker_id",
+    "j_floating_marker_id",
+    "ref_marker_id",
+    "start_marker_id",
+)
 
 Wanted = tuple[Source, str, str, int | None, str]
 Exists = Callable[[str, int], bool]
@@ -50,11 +57,13 @@ def tables(model: Model) -> dict[str, Mapping[int, Any]]:
         "Constraint_Jprim": model.primitives,
         "Constraint_Coupler": model.couplers,
         "Constraint_General": model.general_constraints,
+        "Constraint_PTCV": model.points_on_curves,
         "Motion_Joint": model.motions,
         **{FORCES[name].statement: model.table(name) for name in FORCES},
         "Reference_Variable": model.variables,
         "Control_Diff": model.differentials,
         "Reference_Spline": model.splines,
+        "Reference_ParamCurve": model.curves,
         "Reference_Array": model.arrays,
         "Sensor_Event": model.sensors,
         "Sensor_Evaluate": model.evaluations,
@@ -80,6 +89,9 @@ def wanted(model: Model) -> Iterator[Wanted]:
                 yield element.source, name, "joint_id", element.joint_id or None, "Constraint_Joint"
             for id in getattr(element, "joint_ids", ()):
                 yield element.source, name, "joint_ids", id, "Constraint_Joint"
+    for point in model.points_on_curves.values():
+        name = f"Constraint_PTCV[{point.id}]"
+        yield point.source, name, "curve_id", point.curve_id or None, "Reference_ParamCurve"
     for request in model.requests.values():
         if request.elem_type and request.elem_id:
             statement = STATEMENTS[request.elem_type]

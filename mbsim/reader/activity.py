@@ -23,6 +23,7 @@ _TABLES: Mapping[str, tuple[str, ...]] = {
     "FORCE": _ALL_FORCES,
     "FRICTION": ("JOINTFRICTION",),
     "GCON": ("general_constraints",),
+    "PTCV": ("points_on_curves",),
     "GFORCE": ("VECTORFORCE", "BODYFORCE"),
     "JOINT": ("joints",),
     "JPRIM": ("primitives",),
@@ -39,6 +40,7 @@ _STATEMENTS = {
     "contacts": "Force_Contact",
     "couplers": "Constraint_Coupler",
     "general_constraints": "Constraint_General",
+    "points_on_curves": "Constraint_PTCV",
     "joints": "Constraint_Joint",
     "primitives": "Constraint_Jprim",
     "motions": "Motion_Joint",
@@ -47,7 +49,7 @@ _STATEMENTS = {
 TYPES = spellings(**dict.fromkeys(_TABLES, ""))
 TYPES_NOT_BUILT = spellings(
     **dict.fromkeys(
-        "CVCV CVSF DIFF GEAR GSE LSE MATE MFORCE NFORCE PFORCE PTCV PTDCV PTDSF PTDSFF PTSF SFSF "
+        "CVCV CVSF DIFF GEAR GSE LSE MATE MFORCE NFORCE PFORCE PTDCV PTDSF PTDSFF PTSF SFSF "
         "TFSISO UCON YFORCE".split(),
         "",
     )

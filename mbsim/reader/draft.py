@@ -31,6 +31,7 @@ class Draft:
     couplers: dict[int, el.Coupler] = field(default_factory=dict)
     motions: dict[int, el.Motion] = field(default_factory=dict)
     general_constraints: dict[int, el.GeneralConstraint] = field(default_factory=dict)
+    points_on_curves: dict[int, el.PointOnCurve] = field(default_factory=dict)
     scalar_forces: dict[int, el.ScalarForce] = field(default_factory=dict)
     marker_forces: dict[str, dict[int, el.MarkerForce]] = field(default_factory=dict)
     vector_forces: dict[int, el.VectorForce] = field(default_factory=dict)
@@ -43,6 +44,8 @@ class Draft:
     evaluations: dict[int, el.Evaluation] = field(default_factory=dict)
     differentials: dict[int, el.Differential] = field(default_factory=dict)
     splines: dict[int, el.Spline] = field(default_factory=dict)
+    curves: dict[int, el.ParamCurve] = field(default_factory=dict)
+    curve_matrices: dict[int, int] = field(default_factory=dict)  # of curves that these give
     arrays: dict[int, el.ArrayOfNumbers] = field(default_factory=dict)
     control: ControlDraft = field(default_factory=ControlDraft)
     requests: dict[int, el.Request] = field(default_factory=dict)

@@ -65,6 +65,7 @@ FORCE_ELEMENTS = spellings(
     JOINT="CONSTRAINT_JOINT",
     JPRIM="CONSTRAINT_JPRIM",
     MOTION="MOTION_JOINT MOTION_MARKER",
+    PTCV="CONSTRAINT_PTCV",
     **{name: f"{kind.statement} {kind.spellings}" for name in FORCES if (kind := FORCES[name])},
     CONTACT="FORCE_CONTACT",
 )

@@ -18,6 +18,7 @@ from mbsim.reader.contact import FORCE_CONTACT
 from mbsim.reader.control_siso import CONTROL_SISO
 from mbsim.reader.control_state_eqn import CONTROL_STATE_EQN
 from mbsim.reader.controls import CONTROL_DIFF, SENSOR_EVALUATE, SENSOR_EVENT
+from mbsim.reader.curves import CONSTRAINT_PTCV, REFERENCE_PARAM_CURVE
 from mbsim.reader.draft import Draft
 from mbsim.reader.forces import force_statements
 from mbsim.reader.graphics import POST_GRAPHIC
@@ -47,6 +48,7 @@ STATEMENTS = (
     CONSTRAINT_JPRIM,
     CONSTRAINT_COUPLER,
     CONSTRAINT_GENERAL,
+    CONSTRAINT_PTCV,
     MOTION_JOINT,
     MOTION_MARKER,
     *force_statements(),
@@ -57,6 +59,7 @@ STATEMENTS = (
     REFERENCE_SPLINE,
     REFERENCE_ARRAY,
     REFERENCE_MATRIX,
+    REFERENCE_PARAM_CURVE,
     SENSOR_EVENT,
     SENSOR_EVALUATE,
     POST_REQUEST,

@@ -18,6 +18,7 @@ from mbsim.model.checks import Known, check_model
 from mbsim.model.names import is_adams, is_commands
 from mbsim.reader.constraints import complete_motions
 from mbsim.reader.controls import complete_sensors
+from mbsim.reader.curves import complete_curves
 from mbsim.reader.draft import Draft
 from mbsim.reader.keywords import fold
 from mbsim.reader.linear_systems import expand
@@ -100,6 +101,7 @@ def _read(path: Given, texts: tuple[str, ...]) -> el.Model:
     draft, said_so = _read_draft(name, data, texts)
     draft.faults.extend(map(said_so, expand(draft)))
     draft.faults.extend(map(said_so, complete_sensors(draft)))
+    draft.faults.extend(map(said_so, complete_curves(draft)))
     complete_motions(draft)
     model = _to_model(draft, deck, hashlib.sha256(data + draft.more).hexdigest())
     known = Known(frozenset(draft.broken), draft.display_graphics)
@@ -308,6 +310,7 @@ def _to_model(draft: Draft, deck: Path, sha256: str) -> el.Model:
         couplers=draft.couplers,
         motions=draft.motions,
         general_constraints=draft.general_constraints,
+        points_on_curves=draft.points_on_curves,
         scalar_forces=draft.scalar_forces,
         marker_forces=draft.marker_forces,
         vector_forces=draft.vector_forces,
@@ -318,6 +321,7 @@ def _to_model(draft: Draft, deck: Path, sha256: str) -> el.Model:
         variables=draft.variables,
         differentials=draft.differentials,
         splines=draft.splines,
+        curves=draft.curves,
         arrays=draft.arrays,
         sensors=draft.sensors,
         evaluations=draft.evaluations,

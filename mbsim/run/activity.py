@@ -34,6 +34,7 @@ CONNECTIONS = {
     "COUPLER": "couplers",
     "MOTION": "motions",
     "GCON": "general_constraints",
+    "PTCV": "points_on_curves",
 }
 _OF_APPLIED = ("form", "program", "components", "connection", "law", "by_reactions")
 _OF_SENSORS = ("program", "compare", "value", "located")

@@ -149,6 +149,8 @@ def fail(system: System, detector: Any, code: int, t: float) -> NoReturn:
             )
         reproduce(system.user_friction[element], system.scene.work.law_in, element)
         raise PluginError(f"Force_Contact[{element}]: its subroutine failed at time {t:.12g}")
+    if code == Code.END_OF_CURVE:
+        raise SolverError(_at_end(system, t))
     if code == Code.NOT_REPEATED:
         raise SolverError(_not_repeated(system, t))
     if code == Code.DETECTOR_FAILED and detector is not None:
@@ -215,4 +217,19 @@ def _unsolved(system: System, t: float) -> str:
         f"were found that make the residual {user.name} of {user.source} 0 at time {t:.9g}: it may "
         "have no zero there, jump over it, or not depend on an unknown; results up to there are "
         "kept"
+    )
+
+
+def _at_end(system: System, t: float) -> str:
+    """Return which point has come to the end of its curve."""
+    scene, held = system.scene, [k for k, (s, _) in enumerate(system.connections) if s == "PTCV"]
+    curves, along = scene.curves, scene.state.along
+    last = curves.first[1:] - 1
+    out = (along < curves.begin[curves.first[:-1]]) | (
+        along > curves.begin[last] + curves.length[last]
+    )
+    row = int(np.flatnonzero(out & (curves.closed == 0))[0])
+    return (
+        f"{system.connection_name(held[row])} comes to an end of its curve at time {t:.9g} and has "
+        "nowhere to go; results up to there are kept"
     )

@@ -295,6 +295,12 @@ EQUATIONS = {
         "SPHERICAL",
         '<Constraint_General id="1" expr="DM(102,100) + 0.3*DX(102,100) - 1.1"/>',
     ),
+    "a point on a curve": (
+        "SPHERICAL",
+        '<Reference_ParamCurve id="7">1 -0.6 -0.1 1.3 -0.3 -0.35 1.55 -0.15 -0.3 1.7 0.2 -0.1 '
+        "1.7 0.5 0.2</Reference_ParamCurve>"
+        '<Constraint_PTCV id="1" i_marker_id="102" j_marker_id="100" curve_id="7"/>',
+    ),
     "general on two": ("SPHERICAL", '<Constraint_General id="1" expr="DX(102,101,101) - 1"/>'),
 }
 

@@ -21,6 +21,7 @@ from mbsim.arrays.codes import (
     ASKED,
     AXIS_I,
     AXIS_J,
+    CURVE,
     FOLD_POWER,
     GENERAL,
     KEPT,
@@ -42,6 +43,7 @@ from mbsim.dynamics.constraints.folding import SAMPLED, is_sticking, near_fold, 
 from mbsim.dynamics.constraints.in_use import active_count, is_friction
 from mbsim.dynamics.constraints.terms import (
     angle_term,
+    curve_term,
     distance_term,
     general_term,
     offset_term,
@@ -82,6 +84,8 @@ def fill_equation(scene: Scene, t: float, y: F1, e: int) -> None:
             g, dg, ddg = angle_term(scene, y, i, j, eq.angle[k], G)
         elif kind == TWIST:
             g, dg, ddg = twist_term(scene, y, i, j, G)
+        elif kind == CURVE:
+            g, dg, ddg = curve_term(scene, y, i, j, eq.angle[k], eq.axis[k, AXIS_I], G)
         else:
             g, dg, ddg = distance_term(scene, y, i, j, G)
         value += factor * g

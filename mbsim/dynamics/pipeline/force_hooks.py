@@ -9,6 +9,7 @@ from mbsim.core.address import call_float, vector_at, view
 from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.angles import commit_angles, longest_turn
+from mbsim.dynamics.bodies.curves import commit_curves
 from mbsim.dynamics.expressions.interpreter import interpret
 from mbsim.dynamics.expressions.jets import fill_values
 from mbsim.dynamics.expressions.states import add_slopes
@@ -96,9 +97,16 @@ def evaluate_requests(context: int, t: float, y: Pointer) -> int:
     return failure_or(scene, fill_values(scene, t, vector_at(y, scene.rows.y.shape[1])))
 
 
-def commit_turns(context: int) -> int:
+def commit_turns(context: int, y: Pointer) -> int:
     """The angles of the committed state."""
     return commit_angles(view(context, Scene))
+
+
+def commit_ways(context: int, y: Pointer) -> int:
+    """The same, and where points are on their curves."""
+    scene = view(context, Scene)
+    commit_angles(scene)
+    return commit_curves(scene, vector_at(y, scene.rows.y.shape[1]))
 
 
 def serve_dry_alone(context: int, what: int, t: float, y: Pointer) -> int:

@@ -8,9 +8,8 @@ y, dy (n,) are pointers to doubles, t is a double, all else int64; `context` is 
 Entries that share most of what they compile are one hook with requests (`arrays.hooks`).
 
 A result is 0, or a `Code`, unless the row says otherwise: an answer is >= 0, or less a code. Every
-caller looks at it: it returns the code, or notes it (`arrays.hooks.note_failure`), and the hook
-that an integrator called (`core.problem`) returns what was noted. So a hook that fails ends the
-step, and the run where a shorter step does not help.
+caller returns the code or notes it (`arrays.hooks.note_failure`): a hook that fails ends the step,
+and the run where a shorter step does not help.
 """
 
 from __future__ import annotations
@@ -56,8 +55,7 @@ class Row(NamedTuple):
 
 
 def _never(scene: Scene, method: Method) -> bool:
-    """What Python puts there."""
-    return False
+    return False  # Python puts it there
 
 
 def _no_entry(scene: Scene) -> Callable[..., Any]:
@@ -228,8 +226,8 @@ def _dry(scene: Scene) -> Callable[..., Any]:
     return of.serve_rigid_alone if rigid else of.serve_dry_alone
 
 
-def _has_angles(scene: Scene, method: Method) -> bool:
-    return len(scene.angles.i) > 0
+def _has_ways(scene: Scene, method: Method) -> bool:
+    return len(scene.angles.i) + len(scene.curves.i) > 0
 
 
 def _has_broadphase(scene: Scene, method: Method) -> bool:
@@ -461,10 +459,12 @@ TABLE = (
     ),
     Row(
         Hook.ANGLES,
-        _INT(_INT),
-        _has_angles,
-        _of("pipeline.force_hooks", "commit_turns"),
-        "counts the turns of angles",
+        _INT(_INT, _PTR),  # context, y
+        _has_ways,
+        lambda of: _of(
+            "pipeline.force_hooks", ("commit_turns", "commit_ways")[len(of.curves.i) > 0]
+        )(of),
+        "counts the turns of angles, and follows points along curves",
     ),
     Row(
         Hook.NEAR,

@@ -92,7 +92,7 @@ def accept(scene: Scene, t: float, h: float, y: F1) -> int:
             for k in range(3):
                 state.centre[g, k] = scene.work.frames[g, k]
     if scene.world.hooks[Hook.ANGLES] != 0:
-        note_failure(scene, call_int(scene.world.hooks[Hook.ANGLES], (scene,)))
+        note_failure(scene, call_int(scene.world.hooks[Hook.ANGLES], (scene, y)))
     if len(scene.broadphase.contact) > 0:
         note_failure(scene, call_int(scene.world.hooks[Hook.NEAR], (scene, y)))
     return changed

@@ -34,6 +34,7 @@ from mbsim.reader.adm.control import (
     build_variable,
 )
 from mbsim.reader.adm.couplers import COUPLER, GEAR
+from mbsim.reader.adm.curves import CURVE, PTCV
 from mbsim.reader.adm.declare import (
     ANGLE,
     ANY,
@@ -224,6 +225,8 @@ STATEMENTS = (
     ),
     COUPLER,
     GEAR,
+    CURVE,
+    PTCV,
     AdmStatement(
         "GCON",
         {

@@ -1,0 +1,130 @@
+"""Points of curves that are fixed to bodies: position and slopes by the parameter, the nearest one.
+
+The nearest point is looked for from that of the committed state on, downhill, so that a point
+that is held goes along a curve which meets itself, and a closed one counts its rounds.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.scene import Scene
+from mbsim.core.arrays import F1, V3
+from mbsim.core.codes import Code
+from mbsim.core.jitable import jitable
+from mbsim.core.rotation import cross, dot, scale, sub
+from mbsim.dynamics.bodies.markers import marker_axis, marker_point
+
+#: Most corrections of a parameter.
+_MOST = 100
+#: The last one is less than this part of a piece.
+_ENOUGH = 1e-14
+#: A second slope of the distance below this part of that of a straight line is none.
+_LEAST = 0.1
+
+
+@jitable
+def piece_at(scene: Scene, c: int, u: float) -> tuple[int, float]:
+    """Return the piece of curve c at parameter u, and how far u is behind its begin.
+
+    Beyond an end of an open curve its last piece goes on.
+    """
+    curves = scene.curves
+    low, high = curves.first[c], curves.first[c + 1] - 1
+    begin, end = curves.begin[low], curves.begin[high] + curves.length[high]
+    if curves.closed[c] == 1:
+        u -= math.floor((u - begin) / (end - begin)) * (end - begin)
+    while low < high:
+        middle = (low + high + 1) // 2
+        if u >= curves.begin[middle]:
+            low = middle
+        else:
+            high = middle - 1
+    return low, u - curves.begin[low]
+
+
+@jitable
+def curve_point(scene: Scene, c: int, u: float) -> tuple[V3, V3, V3]:
+    """Return the point of curve c at parameter u, and its first and second slope, in J's axes."""
+    k, s = piece_at(scene, c, u)
+    p = scene.curves.coefficient[k]
+    x, dx, ddx = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for n in range(5, -1, -1):
+        ddx = (s * ddx[0] + 2.0 * dx[0], s * ddx[1] + 2.0 * dx[1], s * ddx[2] + 2.0 * dx[2])
+        dx = (s * dx[0] + x[0], s * dx[1] + x[1], s * dx[2] + x[2])
+        x = (s * x[0] + p[n, 0], s * x[1] + p[n, 1], s * x[2] + p[n, 2])
+    return x, dx, ddx
+
+
+@jitable
+def nearest_parameter(scene: Scene, c: int, d: V3) -> float:
+    """Return at which parameter curve c is nearest to d, from the committed one on downhill.
+
+    With r = d - x(u): r . x' = 0, by Newton's method, no further than a piece at once.
+    """
+    u = scene.state.along[c]
+    for _ in range(_MOST):
+        x, dx, ddx = curve_point(scene, c, u)
+        r = sub(d, x)
+        straight = dot(dx, dx)
+        bent = straight - dot(r, ddx)
+        change = dot(r, dx) / (bent if bent > _LEAST * straight else straight)
+        longest = scene.curves.length[piece_at(scene, c, u)[0]]
+        change = min(longest, max(-longest, change))
+        u += change
+        if abs(change) <= _ENOUGH * longest:
+            break
+    return u
+
+
+@jitable
+def seen_from(scene: Scene, y: F1, c: int) -> V3:
+    """Return where the point that curve c holds is, in J's axes."""
+    j = scene.curves.j[c]
+    d = sub(marker_point(scene, y, scene.curves.i[c]), marker_point(scene, y, j))
+    return (
+        dot(d, marker_axis(scene, j, 0)),
+        dot(d, marker_axis(scene, j, 1)),
+        dot(d, marker_axis(scene, j, 2)),
+    )
+
+
+@jitable
+def across(scene: Scene, c: int, tangent: V3, which: int) -> V3:
+    """Return one of two unit vectors at right angles to a tangent of curve c, in J's axes.
+
+    They follow the axis of J which the curve is least along at the committed state, so that they
+    are smooth within a step.
+    """
+    _, t, _ = curve_point(scene, c, scene.state.along[c])
+    least = 0
+    for k in range(1, 3):
+        if abs(t[k]) < abs(t[least]):
+            least = k
+    t = scale(1.0 / math.sqrt(dot(tangent, tangent)), tangent)
+    axis = (
+        1.0 if least == 0 else 0.0,
+        1.0 if least == 1 else 0.0,
+        1.0 if least == 2 else 0.0,
+    )
+    n = cross(axis, t)
+    n = scale(1.0 / math.sqrt(dot(n, n)), n)
+    return n if which == 0 else cross(t, n)
+
+
+@jitable
+def commit_curves(scene: Scene, y: F1) -> int:
+    """Take the parameters of points that curves hold as committed; return a code.
+
+    A point that has come to the end of an open curve has nowhere to go.
+    """
+    curves = scene.curves
+    for c in range(len(curves.closed)):
+        u = nearest_parameter(scene, c, seen_from(scene, y, c))
+        scene.state.along[c] = u
+        first, last = curves.first[c], curves.first[c + 1] - 1
+        end = curves.begin[last] + curves.length[last]
+        holds = curves.closed[c] == 0 and scene.equations.off[curves.equation[c]] == 0
+        if holds and not curves.begin[first] <= u <= end:
+            return Code.END_OF_CURVE
+    return 0
