@@ -46,6 +46,10 @@ def _values(
             if expression is not None:
                 programs.add(expression, request, forces=True, accelerations=True)
                 made.append((request.id, k + 1))
+    for id in model.looked_at:
+        # no request has a negative id
+        programs.add(model.variables[id].expr, model.variables[id], forces=True, accelerations=True)
+        made.append((-id, 0))
     return made
 
 

@@ -29,7 +29,7 @@ from mbsim.model.forces import (
     ScalarForce,
     VectorForce,
 )
-from mbsim.model.simulation import Change, Simulation, Static, Transient
+from mbsim.model.simulation import Change, Linear, Plant, Simulation, Static, Transient
 from mbsim.model.source import ASIDE, NO_RESULT, Source, Subroutine
 
 __all__ = [
@@ -49,12 +49,14 @@ __all__ = [
     "Joint",
     "JointFriction",
     "JointLimit",
+    "Linear",
     "Marker",
     "MarkerForce",
     "Model",
     "Motion",
     "ParamCurve",
     "PointOnCurve",
+    "Plant",
     "Request",
     "ScalarForce",
     "Sensor",
@@ -465,6 +467,9 @@ class Model:
 
     # elements whose value the caller sets while the model runs, see `run.inputs`
     inputs: tuple[InputElement, ...] = ()
+    # of linear analyses, see `run.plants`: what is added to variables, and variables looked at
+    added: Mapping[int, int] = field(default_factory=dict)
+    looked_at: tuple[int, ...] = ()
 
     @property
     def shown(self) -> tuple[int, ...]:

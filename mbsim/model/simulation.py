@@ -32,6 +32,28 @@ class Static:
 
 
 @dataclass(frozen=True)
+class Plant:
+    """Control_PlantInput, Control_PlantOutput: variables in their order."""
+
+    id: int
+    variable_ids: tuple[int, ...]
+    label: str = ""
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Param_Linear; `inputs` and `outputs` are the ids of the variables that it means."""
+
+    pinput_id: int | None = None
+    poutput_id: int | None = None
+    eigen_analysis: bool = True
+    inputs: tuple[int, ...] = ()
+    outputs: tuple[int, ...] = ()
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
 class Change:
     """An element as a statement of <Command> leaves it; `table` is what `Model.table` takes."""
 
@@ -44,8 +66,8 @@ class Change:
 class Simulation:
     """One Simulate statement: from the end of the one before (or `start_time`) to `end_time`.
 
-    STATIC and ASSEMBLY take no time: both are where they stand. KINEMATIC is a TRANSIENT of a model
-    that has no degree of freedom.
+    STATIC, LINEAR and ASSEMBLY take no time: they are where they stand. KINEMATIC is a TRANSIENT
+    of a model that has no degree of freedom.
     """
 
     analysis_type: str = "TRANSIENT"
@@ -58,5 +80,6 @@ class Simulation:
     changes: tuple[Change, ...] = ()  # all that stood before it in <Command>
     # elements that take no part, by what `Model.table` or `Model` calls their table, and by id
     inactive: tuple[tuple[str, int], ...] = ()
+    linear: Linear = Linear()
     later: bool = False  # STATIC after another of the same statement, at its own start_time
     source: Source = Source()

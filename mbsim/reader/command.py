@@ -19,6 +19,7 @@ from mbsim.reader.kinds import (
     TEXT,
     keyword,
 )
+from mbsim.reader.linear_analysis import resolved
 from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 
 _MAX_ROWS = 1e8  # more output rows than this is a slip of the pen, and no disk holds them
@@ -105,7 +106,7 @@ def _times(entry: Entry) -> tuple[float, float] | None:
 
 
 def _build_timeless(entry: Entry) -> None:
-    """Add an assembly or an equilibrium, which take no time."""
+    """Add an assembly, an equilibrium or a linear analysis, which take no time."""
     draft, kind = entry.draft, entry.get("analysis_type")
     if kind == "ASSEMBLY":
         unused: tuple[str, ...] = ("start_time", "end_time", "duration", *_OUTPUTS)
@@ -115,7 +116,7 @@ def _build_timeless(entry: Entry) -> None:
         if entry.given(name):
             entry.note(f"has no effect with analysis_type {kind}, which takes no time", name)
     now = draft.simulations[-1].end_time if draft.simulations else 0.0
-    if kind == "STATIC" and entry.get("start_time") is not None:
+    if kind != "ASSEMBLY" and entry.get("start_time") is not None:
         if draft.simulations and entry.get("start_time") != now:
             message = f"a later Simulate starts where the one before ended, at {now:g}"
             entry.fault(message, "start_time")
@@ -137,6 +138,7 @@ def _at_once(entry: Entry, kind: str, time: float, later: bool = False) -> el.Si
         draft.static,
         draft.changes,
         tuple(sorted(draft.inactive)),
+        resolved(entry) if kind == "LINEAR" else el.Linear(),
         later,
         entry.source,
     )
@@ -180,7 +182,7 @@ def _build_simulate(entry: Entry) -> None:
     if not entry.given("analysis_type"):
         entry.note("not given; taken as TRANSIENT", "analysis_type")
     kind = entry.get("analysis_type")
-    if kind == "ASSEMBLY" or (kind == "STATIC" and not _lasts(entry)):
+    if kind in ("ASSEMBLY", "LINEAR") or (kind == "STATIC" and not _lasts(entry)):
         _build_timeless(entry)
         return
     if kind == "STATIC":
@@ -323,7 +325,7 @@ SIMULATE = Statement(
     _build_simulate,
     in_model=False,
     in_command=True,
-    about="one analysis: transient, static, quasi-static or assembly",
+    about="one analysis: transient, kinematic, static, quasi-static, linear or assembly",
 )
 STOP = Statement(
     "Stop", {}, _build_stop, in_model=False, in_command=True, note="the deck ends here"

@@ -54,6 +54,8 @@ class Draft:
     gravity: el.Gravity | None = None
     transient: el.Transient | None = None
     static: el.Static = field(default_factory=el.Static)
+    linear: el.Linear = field(default_factory=el.Linear)
+    plants: dict[str, dict[int, el.Plant]] = field(default_factory=dict)  # by statement
     simulations: list[el.Simulation] = field(default_factory=list)
     compatibility: str = ""
     more: bytes = b""  # of another file that says what is run

@@ -23,6 +23,11 @@ from mbsim.reader.draft import Draft
 from mbsim.reader.forces import force_statements
 from mbsim.reader.graphics import POST_GRAPHIC
 from mbsim.reader.keywords import fold, nearest
+from mbsim.reader.linear_analysis import (
+    CONTROL_PLANT_INPUT,
+    CONTROL_PLANT_OUTPUT,
+    PARAM_LINEAR,
+)
 from mbsim.reader.matrix import REFERENCE_MATRIX
 from mbsim.reader.output_statements import OUTPUT_STATEMENTS
 from mbsim.reader.param_simulation import PARAM_SIMULATION
@@ -44,6 +49,7 @@ STATEMENTS = (
     PARAM_SIMULATION,
     PARAM_TRANSIENT,
     PARAM_STATIC,
+    PARAM_LINEAR,
     CONSTRAINT_JOINT,
     CONSTRAINT_JPRIM,
     CONSTRAINT_COUPLER,
@@ -56,6 +62,8 @@ STATEMENTS = (
     CONTROL_DIFF,
     CONTROL_SISO,
     CONTROL_STATE_EQN,
+    CONTROL_PLANT_INPUT,
+    CONTROL_PLANT_OUTPUT,
     REFERENCE_SPLINE,
     REFERENCE_ARRAY,
     REFERENCE_MATRIX,
@@ -95,7 +103,8 @@ REFUSED = {
     "Save": "the result file keeps the state; a run cut short goes on with mbsim run --resume",
 }
 _REFUSED = {fold(name): f"{name} is not taken: {why}" for name, why in REFUSED.items()}
-_NOT_AFTER_STOP = (ACTIVATE, DEACTIVATE, SIMULATE, PARAM_TRANSIENT, PARAM_STATIC, FORCE_GRAVITY)
+_PARAMETERS = (PARAM_TRANSIENT, PARAM_STATIC, PARAM_LINEAR)
+_NOT_AFTER_STOP = (ACTIVATE, DEACTIVATE, SIMULATE, *_PARAMETERS, FORCE_GRAVITY)
 _NOT_BUILT = {fold(name): name for name in NOT_BUILT}
 
 

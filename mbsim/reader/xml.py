@@ -21,6 +21,7 @@ from mbsim.reader.controls import complete_sensors
 from mbsim.reader.curves import complete_curves
 from mbsim.reader.draft import Draft
 from mbsim.reader.keywords import fold
+from mbsim.reader.linear_analysis import check_plants
 from mbsim.reader.linear_systems import expand
 from mbsim.reader.overrides import apply_overrides, as_texts
 from mbsim.reader.parse import MAX_BYTES, Node, parse
@@ -102,6 +103,7 @@ def _read(path: Given, texts: tuple[str, ...]) -> el.Model:
     draft.faults.extend(map(said_so, expand(draft)))
     draft.faults.extend(map(said_so, complete_sensors(draft)))
     draft.faults.extend(map(said_so, complete_curves(draft)))
+    draft.faults.extend(map(said_so, check_plants(draft)))
     complete_motions(draft)
     model = _to_model(draft, deck, hashlib.sha256(data + draft.more).hexdigest())
     known = Known(frozenset(draft.broken), draft.display_graphics)

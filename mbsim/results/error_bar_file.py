@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from mbsim.results.error_bars import Bars
 
 #: What is not held against reruns: times themselves, and the solver's own.
-_ASIDES = ("time", "state/", "errors/", "checkpoint/")
+_ASIDES = ("time", "state/", "errors/", "checkpoint/", "linear/")
 
 
 def over_time(results: Results) -> dict[str, Any]:

@@ -16,11 +16,17 @@ if TYPE_CHECKING:
 #: Groups of a result file that have members or attributes of a known form.
 _GROUPS = (
     *("audit", "stats", "checkpoint", "requests", "bodies", "contacts", "energy", "state"),
-    *("graphics", "contact_points", "errors"),
+    *("graphics", "contact_points", "errors", "linear"),
 )
 _EVENT = ("time", "kind")
 #: What a group says of its elements, beside their signals.
 FACTS = ("id", "label", "type")
+#: Groups of other things than elements.
+NO_ELEMENTS = tuple("checkpoint stats audit state energy requests graphics linear".split())
+#: Datasets that are no signals, whatever their shapes.
+NO_SIGNALS = ("state/", "contact_points/", "errors/", "sensitivity/", "linear/")
+#: What is no key: what a run goes on from, and what pictures are made of.
+NO_KEYS = ("checkpoint/", "graphics/", "markers", "connections")
 
 
 def is_dataset(item: Any) -> bool:

@@ -16,6 +16,9 @@ from mbsim.results.damage import DAMAGE, reads, said_of
 from mbsim.results.error_reading import Errors
 from mbsim.results.form import (
     FACTS,
+    NO_ELEMENTS,
+    NO_KEYS,
+    NO_SIGNALS,
     check_members,
     facts_of,
     is_dataset,
@@ -27,6 +30,7 @@ from mbsim.results.form import (
     texts_of,
     values_of,
 )
+from mbsim.results.linear import WithLinear
 from mbsim.results.mapping import SignalMapping
 from mbsim.results.names import (
     PARTS,
@@ -58,15 +62,9 @@ class Location(NamedTuple):
 
 #: Attributes that have a text for each column.
 _LISTS = ("columns", "measures")
-#: Groups of other things than elements.
-_NO_ELEMENTS = ("checkpoint", "stats", "audit", "state", "energy", "requests", "graphics")
-#: Datasets that are no signals, whatever their shapes.
-_NO_SIGNALS = ("state/", "contact_points/", "errors/", "sensitivity/")
-#: What `keys` leaves out: what a run goes on from, and what pictures are made of.
-_NO_KEYS = ("checkpoint/", "graphics/", "markers", "connections")
 
 
-class Results(SignalMapping, WithSensitivities):
+class Results(SignalMapping, WithSensitivities, WithLinear):
     """What a run recorded; `results["bodies/2/position"]` is an array over output times.
 
     A name may end in ``/x``, ``/y``, ``/z`` or ``/mag`` (a quaternion also in ``/w``, a request
@@ -195,7 +193,7 @@ class Results(SignalMapping, WithSensitivities):
 
         def note(name: str, item: Any) -> None:
             group, _, last = name.rpartition("/")
-            if not is_dataset(item) or name.startswith(_NO_KEYS):
+            if not is_dataset(item) or name.startswith(NO_KEYS):
                 return
             # of a group whose elements stand side by side `_columnwise` gives the names
             if "/" in group or not last or f"{group}/id" not in file:
@@ -222,7 +220,7 @@ class Results(SignalMapping, WithSensitivities):
             self._ids = {
                 group: values_of(item["id"]).tolist()
                 for group, item in self._open().items()
-                if group not in _NO_ELEMENTS and hasattr(item, "keys") and "id" in item
+                if group not in NO_ELEMENTS and hasattr(item, "keys") and "id" in item
             }
         return self._ids
 
@@ -235,7 +233,7 @@ class Results(SignalMapping, WithSensitivities):
         rows = len(file["time"]) if "time" in file else 0
         for name, item in self._stored().items():
             # /state is the solver's own, in its own layout; points are not one a row
-            if not name.startswith(_NO_SIGNALS) and is_signal(item, item.shape, rows):
+            if not name.startswith(NO_SIGNALS) and is_signal(item, item.shape, rows):
                 found[name] = 1 if item.ndim == 1 else item.shape[1]
         shapes = {
             stored: file[stored] for stored in {s.stored for s in self._columnwise().values()}

@@ -87,8 +87,13 @@ class Commands:
         before = self.settings.stages[max(0, stage - 1) : stage]
         known = sum(len(one.simulation.changes) for one in before)
         fresh = self.settings.stages[stage].simulation.changes[known:]
-        rested = any(one.is_static for one in before)
-        return rested or any(c.table in ("motions", "variables") for c in fresh)
+        changed = any(c.table in ("motions", "variables") for c in fresh)
+        return changed or (not self.settings.stages[stage].is_linear and self.rested(stage))
+
+    def rested(self, stage: int) -> bool:
+        """Return whether bodies rest when a Simulate begins: a linear analysis moves none."""
+        before = [one for one in self.settings.stages[:stage] if not one.is_linear]
+        return bool(before) and before[-1].is_static
 
     def assemble(
         self, stage: int, hooks: HookCalls, t: float, y: Any, log: Tell, say: Tell

@@ -25,6 +25,7 @@ from mbsim.geometry.catalog import AT_NORMAL, AT_POINT
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
+    from mbsim.run.loop import Runner
 
 Array = np.ndarray[Any, Any]
 
@@ -263,3 +264,23 @@ class CompliantContacts:
             return float(contact.mu_dynamic)
         across = float(np.hypot(force[1], force[2]))
         return across / float(force[0]) if across > 0.0 and force[0] > 0.0 else 0.0
+
+
+def problems_of(run: Runner) -> Callable[[float, float, Any], Any]:
+    """Return what makes contact problems of steps of a run: (t, h, y)."""
+    from mbsim.arrays.hooks import Joints
+
+    rigid, name = run.methods.rigid, run.system.model.name
+    if rigid is not None:
+        from mbsim.stepping.contact_problem import contact_problem
+
+        return lambda t, h, y: contact_problem(rigid.stepping, name, t)
+    idle = np.zeros(len(run.method.y))
+
+    def evaluate(t: float, y: Any) -> float:
+        return run.hooks.call(run.problem.rhs, t, 0.0, y, idle)
+
+    def accelerate(t: float, y: Any, dy: Any) -> None:
+        run.hooks.ask_joints(Joints.ACCELERATE, t, y, dy)
+
+    return CompliantContacts(run.system, evaluate, accelerate).problem

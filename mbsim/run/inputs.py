@@ -178,10 +178,10 @@ class Inputs(MutableMapping[str, float]):
         return name in self._rows
 
     def __iter__(self) -> Iterator[str]:
-        return (self._shown[k] for k in range(self._count))
+        return (self._shown[k] for k in sorted(self._shown))
 
     def __len__(self) -> int:
-        return self._count
+        return len(self._shown)
 
     def __repr__(self) -> str:
         return repr(dict(self))

@@ -2,23 +2,29 @@
 
 A is that of the linearisation by which implicit methods solve (`dynamics.linearization`). With
 R = (c I - J)^-1 as they have it, V a basis of the states that keep to the constraints, and
-R V = V r, it is c I - r^-1. It is taken by two c, and held against differences of f. B, C and D are
-central differences: of forces that are linear in u exact but for rounding.
+R V = V r, it is c I - r^-1. It is taken by two c, and held against central differences of f, which
+stand in for it where constraints hold bodies that move. B, C and D are central differences: of
+forces that are linear in u exact but for rounding.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
 from mbsim.core.layout import AT_Q, AT_V, BODY_SIZE
 from mbsim.errors import ModelError, SolverError
+from mbsim.results.linear import LinearModel
 
 if TYPE_CHECKING:
-    from mbsim.run.stepping import Stepper
+    from mbsim.compile_model.build import System
+    from mbsim.core.problem import Problem
+    from mbsim.run.hook_calls import HookCalls
+    from mbsim.run.inputs import Inputs
+    from mbsim.run.methods import Methods
+    from mbsim.run.signals_now import SignalsNow
 
 Array = np.ndarray[Any, Any]
 #: Numbers of a body: position, turn about its own axes, velocity, angular velocity.
@@ -32,39 +38,33 @@ _AGREES, _DIFFERS = 1e-6, 1e-3
 _STEP = 1e-5
 
 
-@dataclass(frozen=True)
-class LinearModel:
-    """x' = A x + B u, y = C x + D u about the present state and inputs.
+class Standing(Protocol):
+    """A run that stands at a point, with inputs that can be set and signals that can be read."""
 
-    Attributes
-    ----------
-    A, B, C, D : ndarray
-        (n, n), (n, m), (p, n), (p, m).
-    states : tuple of str
-        ``bodies/2/position/x``; ``bodies/2/turn/z`` is a small turn about the body's own z [rad],
-        ``angular_velocity`` is about its own axes; ``diffs/3/value``.
-    inputs, outputs : tuple of str
-    """
-
-    A: Array
-    B: Array
-    C: Array
-    D: Array
-    states: tuple[str, ...]
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
+    system: System
+    method: Any
+    methods: Methods
+    problem: Problem
+    hooks: HookCalls
+    inputs: Inputs
+    moving_inputs: frozenset[int]
+    signals: SignalsNow
+    state: Any  # all that a linearisation may change; setting it goes back
 
     @property
-    def eigenvalues(self) -> Array:
-        """Eigenvalues of A [1/T], by their real parts, largest first."""
-        found: Array = np.linalg.eigvals(self.A)
-        return found[np.lexsort((found.imag, -found.real))]
+    def time(self) -> float:
+        """Where the run is [T]."""
+        ...
+
+    def changed(self) -> None:
+        """Let signals be evaluated anew: y is another."""
+        ...
 
 
 class _Point:
     """The present state, and f, R and changes about it."""
 
-    def __init__(self, run: Stepper) -> None:
+    def __init__(self, run: Standing) -> None:
         self.run, self.scene, self.t = run, run.system.scene, run.time
         self.y = run.method.y.copy()
         self.nb, self.n = len(self.scene.bodies.mass), len(self.y)
@@ -180,7 +180,7 @@ def _independent(free: Array, nb: int) -> tuple[list[int], Array]:
     return chosen, basis @ np.linalg.inv(basis[chosen])
 
 
-def linearize(run: Stepper, outputs: tuple[str, ...], inputs: tuple[str, ...]) -> LinearModel:
+def linearize(run: Standing, outputs: tuple[str, ...], inputs: tuple[str, ...]) -> LinearModel:
     """Return the model of a run linearised where it stands; the run is left as it is.
 
     Raises
@@ -188,8 +188,7 @@ def linearize(run: Stepper, outputs: tuple[str, ...], inputs: tuple[str, ...]) -
     ModelError
         For an input that gives a velocity: u' would stand in the equations.
     SolverError
-        Where f has no slope there, or states that keep to the constraints do not stay what they
-        are to first order: joints of a model that moves.
+        Where f has no slope there.
     """
     # the scene's hooks are one: those of a running implicit method stand there
     kept, hooks = run.state, run.system.scene.world.hooks.copy()
@@ -200,7 +199,7 @@ def linearize(run: Stepper, outputs: tuple[str, ...], inputs: tuple[str, ...]) -
         run.state = kept
 
 
-def _linearized(run: Stepper, outputs: tuple[str, ...], inputs: tuple[str, ...]) -> LinearModel:
+def _linearized(run: Standing, outputs: tuple[str, ...], inputs: tuple[str, ...]) -> LinearModel:
     from mbsim.dynamics.pipeline.problem import implicit_hooks
 
     rows_of = {name: run.inputs.row_of(name) for name in inputs}
@@ -220,30 +219,19 @@ def _linearized(run: Stepper, outputs: tuple[str, ...], inputs: tuple[str, ...])
         )
     problem, lives = implicit_hooks(run.system.scene, run.problem, False)
     point = _Point(run)
-    scales = run.system.scene.world.scale
-    rate = float(scales[SCALE_SPEED] / scales[SCALE_LENGTH])
-    chosen, V = _independent(point.free(), point.nb)
-    first = point.resolvent(rate, problem)
-    A = rate * np.eye(len(chosen)) - np.linalg.inv((first @ V)[chosen])
-    c = 1.5 * max(rate, float(np.abs(np.linalg.eigvals(A)).max(initial=0.0)))
-    again = c * np.eye(len(chosen)) - np.linalg.inv((point.resolvent(c, problem) @ V)[chosen])
-    size = max(float(np.abs(A).max(initial=0.0)), 1e-300)
-    slopes = np.zeros_like(A)
-    C = np.zeros((len(outputs), len(chosen)))
     scale = point.scale
-    for k in range(len(chosen)):
-        change = _STEP * V[:, k] * scale
-        ends = [point.moved(change), point.moved(-change)]
-        up, down = (point.lowered(point.f(y)) / scale for y in ends)
-        slopes[:, k] = (up - down)[chosen] / (2.0 * _STEP)
-        seen = [_read(run, y, outputs) for y in ends]
-        C[:, k] = (seen[0] - seen[1]) / (2.0 * _STEP)
-    if np.abs(A - again).max(initial=0.0) > _AGREES * size * len(A):
-        raise SolverError(
-            _unfit(run, "the linearisation depends on the coefficient it is solved by")
-        )
-    if np.abs(A - slopes).max(initial=0.0) > _DIFFERS * size:
-        raise SolverError(_unfit(run, "differences of the equations give other slopes"))
+    chosen, V = _independent(point.free(), point.nb)
+    A = _resolved(point, problem, chosen, V)
+    slopes, sides, C = _differences(run, point, (chosen, V), outputs)
+    size = max(float(np.abs(slopes).max(initial=0.0)), 1e-300)
+    if A is None or np.abs(A - slopes).max(initial=0.0) > _DIFFERS * size:
+        # implicit methods leave out how constraints turn with bodies that move
+        A = slopes
+        if sides > _DIFFERS * size:
+            raise SolverError(
+                f"linearize at time {run.time:.9g}: differences to both sides give other slopes: "
+                "a force has a kink here"
+            )
     B = np.zeros((len(chosen), len(inputs)))
     D = np.zeros((len(outputs), len(inputs)))
     for k, row in enumerate(rows_of.values()):
@@ -254,24 +242,55 @@ def _linearized(run: Stepper, outputs: tuple[str, ...], inputs: tuple[str, ...])
     unit = scale[chosen]
     del lives
     return LinearModel(
-        again * unit[:, None] / unit,
+        A * unit[:, None] / unit,
         B * unit[:, None],
         C / unit,
         D,
         tuple(point.names[k] for k in chosen),
         inputs,
         outputs,
+        tuple(point.names),
+        V * scale[:, None] / unit,
+        run.time,
     )
 
 
-def _unfit(run: Stepper, why: str) -> str:
-    return (
-        f"linearize at time {run.time:.9g}: {why}: a force has a kink here, or joints hold bodies "
-        "that move; take a state of rest or of steady motion"
-    )
+def _resolved(point: _Point, problem: Any, chosen: list[int], V: Array) -> Array | None:
+    """Return A by the linearisation of implicit methods, None where it is not that of one A."""
+    scales = point.scene.world.scale
+    rate = float(scales[SCALE_SPEED] / scales[SCALE_LENGTH])
+    unit = np.eye(len(chosen))
+    try:
+        A = rate * unit - np.linalg.inv((point.resolvent(rate, problem) @ V)[chosen])
+        c = 1.5 * max(rate, float(np.abs(np.linalg.eigvals(A)).max(initial=0.0)))
+        again = c * unit - np.linalg.inv((point.resolvent(c, problem) @ V)[chosen])
+    except np.linalg.LinAlgError:
+        return None
+    size = max(float(np.abs(A).max(initial=0.0)), 1e-300)
+    same = np.abs(A - again).max(initial=0.0) <= _AGREES * size * len(A)
+    return again if same else None
 
 
-def _read(run: Stepper, y: Array, outputs: tuple[str, ...]) -> Array:
+def _differences(
+    run: Standing, point: _Point, states: tuple[list[int], Array], outputs: tuple[str, ...]
+) -> tuple[Array, float, Array]:
+    """Return A by central differences, how much those to one side differ at most, and C."""
+    chosen, V = states
+    scale, n = point.scale, len(chosen)
+    A, C, sides = np.zeros((n, n)), np.zeros((len(outputs), n)), 0.0
+    here = (point.lowered(point.f(point.moved(np.zeros(len(scale))))) / scale)[chosen]
+    for k in range(n):
+        change = _STEP * V[:, k] * scale
+        ends = [point.moved(change), point.moved(-change)]
+        up, down = ((point.lowered(point.f(y)) / scale)[chosen] for y in ends)
+        A[:, k] = (up - down) / (2.0 * _STEP)
+        sides = max(sides, float(np.abs(up + down - 2.0 * here).max(initial=0.0)) / _STEP)
+        seen = [_read(run, y, outputs) for y in ends]
+        C[:, k] = (seen[0] - seen[1]) / (2.0 * _STEP)
+    return A, sides, C
+
+
+def _read(run: Standing, y: Array, outputs: tuple[str, ...]) -> Array:
     """Return signals at another point."""
     if not outputs:
         return np.zeros(0)
@@ -284,12 +303,14 @@ def _read(run: Stepper, y: Array, outputs: tuple[str, ...]) -> Array:
     return np.array([float(value) for value in found])
 
 
-def _input_step(run: Stepper, row: int) -> float:
+def _input_step(run: Standing, row: int) -> float:
     """Return half of the step of an input's differences; forces are mostly linear in it."""
     return max(1.0, abs(run.inputs.values_now[row])) * 2.0**-10
 
 
-def _by_input(run: Stepper, point: _Point, row: int, outputs: tuple[str, ...]) -> tuple[Array, ...]:
+def _by_input(
+    run: Standing, point: _Point, row: int, outputs: tuple[str, ...]
+) -> tuple[Array, ...]:
     """Return y' and signals for an input that is a little larger, and a little smaller."""
     value, step = run.inputs.values_now[row], _input_step(run, row)
     found = []

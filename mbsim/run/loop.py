@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -22,6 +22,7 @@ from mbsim.run.commands import Commands
 from mbsim.run.divergence import Pace, next_budget
 from mbsim.run.failures import fail, give_up
 from mbsim.run.hook_calls import HookCalls, make_detector
+from mbsim.run.linear_analysis import LinearAnalyses
 from mbsim.run.options import Notify, Progress, TooMuchWork
 from mbsim.run.settings import Settings, Stage, output_times
 
@@ -90,6 +91,7 @@ class Runner:
         self._first: dict[str, Any] | None = None  # that of the run's begin, while AUTO goes back
         self.dump: ContactProblems | None = None
         self.sensitivities: Sensitivities | None = None
+        self.linear = LinearAnalyses(system.model)
 
     def _warn_of_states(self) -> None:
         """Say of subroutines with states that VERLET holds their friction back."""
@@ -124,41 +126,22 @@ class Runner:
 
     def _keeps_end(self) -> bool:
         """Return whether the row at the end is this stage's: the last's, or one rest of several."""
-        rest = [stage.is_static for stage in self.settings.stages[self.stage : self.stage + 2]]
-        return len(rest) == 1 or all(rest)
+        stages = self.settings.stages[self.stage : self.stage + 2]
+        # one that follows and moves nothing has the same row at its begin
+        return len(stages) == 1 or (not any(s.takes_time for s in stages) and stages[1].is_static)
 
     def dump_every(self, every: int, resumed: bool) -> None:
         """Write the contact problem of every so many steps from here on."""
         from mbsim.integrators import scheme
-        from mbsim.run.dumping import ContactProblems
+        from mbsim.run.dumping import ContactProblems, problems_of
 
         folder = self.recorder.directory
         if folder is None:
             raise ModelError("dump_fclib needs an output folder")
         self.dump = ContactProblems(
-            self.system.model.name, every, folder / "fclib", self._problems(), resumed
+            self.system.model.name, every, folder / "fclib", problems_of(self), resumed
         )
         self.dump.next += int(self.method.counts[scheme.STEPS]) // every * every
-
-    def _problems(self) -> Callable[[float, float, Any], Any]:
-        """Return what makes contact problems of steps: (t, h, y), see `run.dumping`."""
-        from mbsim.arrays.hooks import Joints
-        from mbsim.run.dumping import CompliantContacts
-
-        rigid, name = self.methods.rigid, self.system.model.name
-        if rigid is not None:
-            from mbsim.stepping.contact_problem import contact_problem
-
-            return lambda t, h, y: contact_problem(rigid.stepping, name, t)
-        idle = np.zeros(len(self.method.y))
-
-        def evaluate(t: float, y: Any) -> float:
-            return self.hooks.call(self.problem.rhs, t, 0.0, y, idle)
-
-        def accelerate(t: float, y: Any, dy: Any) -> None:
-            self.hooks.ask_joints(Joints.ACCELERATE, t, y, dy)
-
-        return CompliantContacts(self.system, evaluate, accelerate).problem
 
     def _dump(self) -> None:
         """Write the contact problem of the step taken last, where its turn has come."""
@@ -180,7 +163,8 @@ class Runner:
         arrays["stage"] = np.array(self.stage)
         arrays["begun"] = np.array(int(self._begun))
         arrays["time"] = np.array(self.method.memory[0])
-        return arrays | self.methods.saved() | self.sensing.saved() | self.pace.saved()
+        arrays |= self.methods.saved() | self.linear.saved()
+        return arrays | self.sensing.saved() | self.pace.saved()
 
     def restore(self, saved: dict[str, Any]) -> None:
         """Go back to a checkpoint."""
@@ -192,6 +176,7 @@ class Runner:
         self.methods.restore(saved)
         self.stage, self._begun = int(saved["stage"]), bool(saved["begun"])
         self.sensing.restore(saved)
+        self.linear.restore(saved)
         self.pace = self._pace()
         self.pace.restore(saved)
 
@@ -298,9 +283,12 @@ class Runner:
             self.commands.assemble(self.stage, self.hooks, t, method.y, self.log.line, self.say)
         if simulation.analysis_type == "KINEMATIC":
             check_kinematic(self.system, simulation)
-        if simulation.analysis_type == "STATIC":
+        if stage.is_static:
             balance_bodies(self.system, self.hooks, simulation, method.y, method.k[0], self.say)
-            goes_on = False
+        if stage.is_linear:
+            rested = self.commands.rested(self.stage)
+            self.linear.analyse(self, simulation.linear, rested, self.say)
+        goes_on = stage.takes_time
         if goes_on and self.methods.explicit.order > 0.0:
             limit_first(self.system, self.hooks, t, method, self.say)
         if (
@@ -355,7 +343,7 @@ class Runner:
         plan[AUDIT_TOL], plan[AUDIT_UNTIL] = stage.tol, simulation.end_time
         if fresh:
             self.pace = self._pace()
-        if fresh or stage.is_static:
+        if fresh or not stage.takes_time:
             if self.stage > 0:
                 self._before = self.checkpoint()
                 # the statement may have changed what acts

@@ -24,6 +24,8 @@ from mbsim.model.forces import rigid_forces
 from mbsim.model.names import element_name, is_adams
 
 DEFAULT_TOL = 1e-5
+#: Analyses of one time, which may be that at which a run ends.
+_AT_ONCE = ("STATIC", "LINEAR")
 TIGHTEST = 1e-15
 #: Of an Adams deck, so that its curves agree with Adams' own to the digits that those carry.
 DEFAULT_TOL_ADAMS = 1e-8
@@ -55,6 +57,16 @@ class Stage:
     def is_static(self) -> bool:
         """Whether it is the search for an equilibrium."""
         return self.simulation.analysis_type == "STATIC"
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether it linearises the model where it stands."""
+        return self.simulation.analysis_type == "LINEAR"
+
+    @property
+    def takes_time(self) -> bool:
+        """Whether there is something to integrate."""
+        return not (self.is_static or self.is_linear)
 
 
 @dataclass(frozen=True)
@@ -126,12 +138,12 @@ def _simulations(
         planned = [
             s
             for s in planned
-            if s.start_time < end_time or (s.analysis_type == "STATIC" and s.start_time <= end_time)
+            if s.start_time < end_time or (s.start_time <= end_time and s.analysis_type in _AT_ONCE)
         ]
         if not planned:
             raise ModelError(f"end_time={end_time:g} is before the deck's first start_time")
         kept = [replace(s, end_time=min(s.end_time, end_time)) for s in planned]
-        if kept[-1].analysis_type != "STATIC":
+        if kept[-1].analysis_type not in _AT_ONCE:
             kept[-1] = replace(kept[-1], end_time=end_time)
         planned = kept
     if not planned:

@@ -5,25 +5,23 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from os import PathLike
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, NamedTuple
+from typing import IO, TYPE_CHECKING, Any
 
-from mbsim import __version__
 from mbsim.core.profile import part, profiling
 from mbsim.errors import Interrupted, ModelError, ResultsError
 from mbsim.model.elements import Model
 from mbsim.run.loop import Runner
 from mbsim.run.options import Notify, Options, Progress
+from mbsim.run.preparing import begin_log, check_plugins, prepare
 from mbsim.run.settings import Settings, output_rows, settle, tightened
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
-    from mbsim.compile_model.changes import Parameters
     from mbsim.results.audit import Audit
-    from mbsim.results.log import RunLog
     from mbsim.results.reading import Results
     from mbsim.sensitivity.parameters import Direction
 
@@ -63,76 +61,6 @@ def _limited(system: System, timeout: float | None, tell: Notify) -> AbstractCon
     users = (*(user for _, user in system.user_laws), *system.residuals.values())
     interpreted = system.subroutines or system.posts or not all(user.compiled for user in users)
     return limited(timeout, tell, bool(interpreted))
-
-
-def _parameters(system: System, settings: Settings) -> list[Parameters]:
-    """Return the parameters of every stage where commands change elements, else nothing."""
-    given = [stage.simulation.changes for stage in settings.stages]
-    if not any(given):
-        return []
-    from mbsim.compile_model.changes import make_room, parameters
-
-    stages = [parameters(system, changes) for changes in given]
-    system.scene = make_room(system.scene, stages)
-    return stages
-
-
-class Prepared(NamedTuple):
-    """A model made ready to run: its arrays, and what is said of it."""
-
-    system: System
-    said: list[str]  # lines for the log
-    attributes: dict[str, str | float | int]  # of a result file
-    changes: list[Parameters]  # of every stage, where commands change elements
-
-
-def _check_plugins(files: Sequence[Path]) -> None:
-    """Raise `ModelError` where a file of `plugins` is not there."""
-    for file in files:
-        if not file.is_file():
-            raise ModelError(f"--plugin {file}: no such file")
-
-
-def prepare(
-    model: Model,
-    settings: Settings,
-    files: list[Path],
-    detector: str,
-    interpret: bool,
-    scripts: bool,
-    tell: Notify,
-) -> Prepared:
-    """Return a model as a system, having told the user what is about to run.
-
-    Parameters
-    ----------
-    model : Model
-    settings : Settings
-    files : list of Path
-        With user subroutines.
-    detector, interpret, scripts
-        As `detector`, `interpret_plugins` and `scripts` of `simulate`.
-    tell : callable
-        Called with lines for the user.
-    """
-    from mbsim.compile_model.build import build
-    from mbsim.core import jit
-    from mbsim.plugins.permission import no_scripts
-
-    jit.on_first_compile = lambda: tell(
-        "compiling what this model needs (a quarter of a minute to one); later runs load it"
-    )
-    jit.compiled = jit.expected = 0
-    jit.on_plan = lambda: tell(f"compiling: {jit.expected - jit.compiled} functions are left")
-    _check_plugins(files)
-    said: list[str] = []
-    with no_scripts(not scripts), part("build"):
-        system = build(model, files, interpret, detector, said.append)
-    changes = _parameters(system, settings)
-    said += _announce(system, settings, said, tell)
-    return Prepared(
-        system, said, _attributes(system, settings, detector, files, interpret), changes
-    )
 
 
 def simulate(
@@ -281,7 +209,7 @@ def _run(model: Model, options: Options) -> Results:
     files = [Path(file) for file in options.plugins]
     folder = None if options.output is None else Path(options.output)
     if options.resume and folder is not None:
-        _check_plugins(files)
+        check_plugins(files)
         if (whole := completed(model, folder, tell)) is not None:
             return whole
     how = options.detector, options.interpret_plugins, options.scripts
@@ -354,16 +282,6 @@ def _directions(settings: Settings, system: System, options: Options) -> list[Di
         return sensitivity.directions(system, options)
 
 
-def begin_log(log: RunLog, system: System, notes: Iterable[str]) -> None:
-    """Write what is said before the run, and let users' code write there."""
-    for note in notes:
-        log.line(note)
-    if system.user_laws or system.subroutines or system.posts:
-        from mbsim.plugins import host
-
-        host.log = log.line
-
-
 def end_users(system: System) -> None:
     """Let interpreters that were started for the run end."""
     if any(user.language == "Octave" for _, user in system.user_laws):
@@ -423,55 +341,6 @@ def _finish(
         end_users(system)
 
 
-def _announce(system: System, settings: Settings, said: list[str], tell: Notify) -> list[str]:
-    """Tell the user what is about to run; return the lines of it that are for the log as well."""
-    for note in said:
-        # what a script will probably fail at is for the terminal too
-        if ": warning: " in note:
-            tell(note)
-    for note in settings.notes:
-        tell(note)
-    for number, user in system.user_laws:
-        how = f"{user.how}: {user.reason}" if user.reason else user.how
-        tell(f"Force_Contact[{number}]: {user.name} of {user.source.name}, {how}")
-    more = []
-    for post in system.posts:
-        more.append(
-            f"Force_Contact[{post.contact.id}]: {post.user.fnc_name} of "
-            f"{post.source.name}, called at output times"
-        )
-        tell(more[-1])
-    for user_subroutine in system.subroutines.values():
-        statement, number = user_subroutine.element
-        source = user_subroutine.source.name
-        more.append(f"{statement}[{number}]: {user_subroutine.name} of {source}, interpreted")
-        tell(more[-1])
-    return more
-
-
-def _attributes(
-    system: System, settings: Settings, detector: str, files: list[Path], interpret: bool
-) -> dict[str, str | float | int]:
-    """Return what a result file says of its run."""
-    model = system.model
-    return {
-        "mbsim_version": __version__,
-        "model_file": model.file,
-        "model_sha256": model.sha256,
-        "units": f"{model.units.force} {model.units.mass} {model.units.length} {model.units.time}",
-        "integrator": settings.integrator,
-        "tol": settings.tol,
-        "tol_from": settings.tolerances,
-        "end_time": settings.end_time,
-        "print_interval": settings.stages[-1].simulation.print_interval,
-        "detector": detector,
-        # what `request` needs to make the same forces again
-        "overrides": "\n".join(model.overrides),
-        "plugins": "\n".join(map(str, files)),
-        "interpret_plugins": int(interpret),
-    }
-
-
 def _keep(
     runner: Runner,
     status: str,
@@ -493,6 +362,7 @@ def _keep(
     for line in runner.sensitivities.lines if runner.sensitivities is not None else ():
         runner.say(line)
     results: Results = recorder.close(status, stats, contacts, audit, last, close_log)
+    results = runner.linear.kept(results)
     if runner.sensitivities is None:
         return results
     from mbsim.results.error_bar_file import with_tables

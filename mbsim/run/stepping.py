@@ -20,16 +20,17 @@ from mbsim.run.history import Chain, History
 from mbsim.run.inputs import Inputs, with_inputs
 from mbsim.run.loop import FIRST_BUDGET, Runner
 from mbsim.run.options import Notify
+from mbsim.run.preparing import begin_log, prepare
 from mbsim.run.settings import Settings, settle
 from mbsim.run.signals_now import SignalsNow
-from mbsim.run.simulation import begin_log, end_users, prepare
+from mbsim.run.simulation import end_users
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
     from mbsim.compile_model.changes import Parameters
     from mbsim.model.elements import Model
+    from mbsim.results.linear import LinearModel
     from mbsim.results.reading import Results
-    from mbsim.run.linear_model import LinearModel
 
 #: Part of a time by which one behind the end is taken for the end: sums of steps round.
 _ROUNDED = 1e-9
@@ -171,7 +172,8 @@ class Stepper(Runner):
         self._open()
         status = "finished" if self.finished else "running"
         folder = None if output is None else Path(output)
-        return self._history.results(folder, status, self.stats(0.0, 0.0), self.audit())
+        found = self._history.results(folder, status, self.stats(0.0, 0.0), self.audit())
+        return self.linear.kept(found)
 
     def linearize(
         self, outputs: str | Sequence[str] = (), inputs: str | Sequence[str] | None = None

@@ -173,6 +173,8 @@ def refused(system: System, settings: Any) -> str | None:
     stages = [stage.simulation for stage in settings.stages]
     if any(stage.analysis_type == "STATIC" for stage in stages):
         return "a static equilibrium in <Command> is not built"
+    if any(stage.analysis_type == "LINEAR" for stage in stages):
+        return "a linear analysis in <Command> is not built"
     if any(stage.changes or stage.inactive for stage in stages):
         return "changes of elements in <Command> are not built"
     if model.sensors:

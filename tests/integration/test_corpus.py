@@ -4,6 +4,8 @@ A deck of tests/corpus/ says in its comments what it is held against, a closed f
 an independent integration:
 
     check: REQUEST.COLUMN at TIME = VALUE within TOLERANCE
+    linear: ANALYSIS MATRIX = NUMBERS within TOLERANCE      of a linear analysis, row by row
+    linear: ANALYSIS states N inputs N outputs N
     run: end_time=T print_interval=DT      of a deck that says neither
     refused: LINE: WORDS                   of a deck that cannot be run
 """
@@ -22,10 +24,12 @@ from helpers.folders import CORPUS
 from mbsim.errors import DeckError
 
 _CHECK = re.compile(r"check: (\d+)\.F(\d) at (\S+) = (\S+) within (\S+)")
+_LINEAR = re.compile(r"linear: (\d+) (\w+) = (.+) within (\S+)")
+_SIZES = re.compile(r"linear: (\d+) states (\d+) inputs (\d+) outputs (\d+)")
 _RUN = re.compile(r"run: (.*)")
 _REFUSED = re.compile(r"refused: (\d+): (.*)")
 #: Decks that a command file runs.
-_PARTS = ("adams_activity.adm", "adams_held_state.adm", "adams_spring.adm")
+_PARTS = ("adams_activity.adm", "adams_held_state.adm", "adams_linear.adm", "adams_spring.adm")
 
 
 def decks(pattern: re.Pattern[str]) -> list[Any]:
@@ -53,6 +57,35 @@ def test_a_deck_runs_to_its_reference(path: Path) -> None:
         assert found == pytest.approx(float(value), abs=float(tolerance)), (request, column, time)
 
 
+@pytest.mark.parametrize("path", decks(_SIZES))
+def test_a_deck_is_linearised_as_its_reference(path: Path, tmp_path: Path) -> None:
+    text = path.read_text("utf-8")
+    mbsim.simulate(mbsim.read_model(path), output=tmp_path)
+    with mbsim.open_results(next(tmp_path.glob("*.h5"))) as results:
+        models = results.linear
+        kept = {k: results[f"linear/{k}/frequencies"] for k in range(1, len(models) + 1)}
+    for k, *sizes in _SIZES.findall(text):
+        model = models[int(k) - 1]
+        found = [len(each) for each in (model.states, model.inputs, model.outputs)]
+        assert found == [int(size) for size in sizes]
+        assert np.array_equal(kept[int(k)], [mode.frequency for mode in model.modes])
+    for k, what, values, tolerance in _LINEAR.findall(text):
+        found = linear_numbers(models[int(k) - 1], what)
+        expected = np.array(values.split(), dtype=float)
+        np.testing.assert_allclose(found, expected, rtol=0.0, atol=float(tolerance), err_msg=what)
+
+
+def linear_numbers(model: Any, what: str) -> Any:
+    """Return numbers of a linearised model by their name in a deck's comments."""
+    if what == "frequencies":
+        return np.array([mode.frequency for mode in model.modes])
+    if what == "damping_ratios":
+        return np.array([mode.damping_ratio for mode in model.modes])
+    if what == "gain":
+        return (model.D - model.C @ np.linalg.solve(model.A, model.B)).ravel()
+    return np.ravel(getattr(model, what))
+
+
 @pytest.mark.parametrize("path", decks(_REFUSED))
 def test_a_deck_is_refused_by_name_and_line(path: Path) -> None:
     with pytest.raises(DeckError) as caught:
@@ -63,6 +96,6 @@ def test_a_deck_is_refused_by_name_and_line(path: Path) -> None:
 
 
 def test_every_deck_has_a_reference() -> None:
-    checked = {each.values[0].name for each in (*decks(_CHECK), *decks(_REFUSED))}
+    checked = {each.values[0].name for each in (*decks(_CHECK), *decks(_SIZES), *decks(_REFUSED))}
     files = {p.name for p in CORPUS.iterdir() if p.suffix in (".xml", ".adm", ".acf")}
     assert files - checked == set(_PARTS)

@@ -23,7 +23,8 @@ from mbsim.reader.adm.lexer import split_statements, to_node, unique
 from mbsim.reader.adm.translate import read_as
 from mbsim.reader.command import SIMULATE as XML_SIMULATE
 from mbsim.reader.keywords import fold, nearest, spellings
-from mbsim.reader.kinds import COUNT, POSITIVE, REAL, keyword
+from mbsim.reader.kinds import COUNT, ID, POSITIVE, REAL, TEXT, keyword
+from mbsim.reader.linear_analysis import PARAM_LINEAR
 from mbsim.reader.statement import Entry, Spec, Statement
 
 _MODEL = re.compile(r"\s*FILE\s*/.*?\bMOD[EL]*\s*=\s*([^,!\s]+)", re.IGNORECASE)
@@ -51,6 +52,16 @@ def _build_simulate(entry: Entry) -> None:
     read_as(entry, XML_SIMULATE, names, {"analysis_type": _KINDS[kind]})
 
 
+def _build_linear(entry: Entry) -> None:
+    """Add a linear analysis."""
+    names = {"PINPUT": "pinput_id", "POUTPUT": "poutput_id"}
+    eigen = "TRUE" if entry.get("KIND", "EIGENSOL") == "EIGENSOL" else "FALSE"
+    before = entry.draft.linear
+    read_as(entry, PARAM_LINEAR, names, {"eigen_analysis": eigen})
+    read_as(entry, XML_SIMULATE, {}, {"analysis_type": "LINEAR"})
+    entry.draft.linear = before
+
+
 def _build_integrator(entry: Entry) -> None:
     """Set tolerance and steps of the analyses that follow."""
     draft = entry.draft
@@ -70,6 +81,26 @@ SIMULATE = AdmStatement(
     },
     _build_simulate,
     words={name: ("KIND", name) for name in _KINDS},
+    xml="Simulate",
+)
+_LINEAR_KINDS = ("EIGENSOL", "STATEMAT")
+_LINEAR_FILES = "matrices, eigenvalues and shapes are in /linear of the result file"
+LINEAR = AdmStatement(
+    "LINEAR",
+    {
+        "KIND": Spec(keyword(spellings(**dict.fromkeys(_LINEAR_KINDS, "")))),
+        "PINPUT": Spec(ID),
+        "POUTPUT": Spec(ID),
+        "PSTATE": Spec(ID, refused="other states than positions and turns are not built"),
+        "NODAMPING": Spec(TEXT, refused="is not built; take the damping out of the forces"),
+        **{
+            name: Spec(TEXT, note=_LINEAR_FILES)
+            for name in ("FILE", "FORMAT", "COORDS", "TABLE", "KINETIC", "ORIGINAL", "NORMALMODE")
+        },
+    },
+    _build_linear,
+    words={name: ("KIND", name) for name in _LINEAR_KINDS}
+    | {name: (name, "TRUE") for name in ("NODAMPING", "KINETIC", "ORIGINAL", "NORMALMODE")},
     xml="Simulate",
 )
 INTEGRATOR = AdmStatement(
@@ -132,6 +163,7 @@ def _words(names: set[str]) -> dict[str, str]:
 _OUTPUT = "results and messages are mbsim's own; it sets nothing"
 COMMANDS = (
     SIMULATE,
+    LINEAR,
     INTEGRATOR,
     EQUILIBRIUM,
     _switch(ACTIVATE),
@@ -149,7 +181,7 @@ _BY_KEY = {fold(command.name): command for command in COMMANDS}
 #: Documented commands that change the model or what is done with it.
 NOT_BUILT = (
     "ACCGRAV ARRAY BEAM BUSHING CONTACT COUPLER DIFF FRICTION GEAR GFORCE "
-    "JOINT LINEAR LSE MARKER MOTION PART RELOAD SAVE SENSOR SFORCE SPLINE SPRINGDAMPER TFSISO "
+    "JOINT LSE MARKER MOTION PART RELOAD SAVE SENSOR SFORCE SPLINE SPRINGDAMPER TFSISO "
     "VARIABLE VFORCE VTORQUE"
 ).split()
 

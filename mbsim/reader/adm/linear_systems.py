@@ -7,8 +7,9 @@ from mbsim.reader.adm.translate import read_as, written
 from mbsim.reader.control_siso import CONTROL_SISO
 from mbsim.reader.control_state_eqn import CONTROL_STATE_EQN
 from mbsim.reader.kinds import COUNT, FLAG, ID, Kind, keyword
+from mbsim.reader.linear_analysis import CONTROL_PLANT_INPUT, CONTROL_PLANT_OUTPUT
 from mbsim.reader.matrix import REFERENCE_MATRIX
-from mbsim.reader.statement import Entry, Spec
+from mbsim.reader.statement import Entry, Spec, Statement
 from mbsim.reader.tables import VARIABLES as BY_BLANKS
 
 _NOT_BUILT = "is documented but not built yet; give VALUES"
@@ -70,6 +71,19 @@ def build_linear(entry: Entry) -> None:
     read_as(entry, CONTROL_STATE_EQN, names)
 
 
+def _plant(name: str, statement: Statement) -> AdmStatement:
+    """Return the statement that lists inputs or outputs of linear analyses."""
+
+    def build(entry: Entry) -> None:
+        read_as(entry, statement, {"VARIABLES": "variable_id_list"})
+
+    return AdmStatement(
+        name, {**_ID, "VARIABLES": Spec(VARIABLES, required=True)}, build, xml=statement.name
+    )
+
+
+PINPUT = _plant("PINPUT", CONTROL_PLANT_INPUT)
+POUTPUT = _plant("POUTPUT", CONTROL_PLANT_OUTPUT)
 LSE = AdmStatement(
     "LSE",
     {
