@@ -15,7 +15,9 @@ import click
 from mbsim.cli.messages import counted, echo
 
 if TYPE_CHECKING:
+    from mbsim.results.reading import Results
     from mbsim.view.run_data import RunData
+    from mbsim.view.scene import Scene
 
 #: Largest side of a picture [pixels].
 _LARGEST = 8192
@@ -54,6 +56,12 @@ _GLTF = "glTF model", "--gltf"
     type=click.Path(path_type=Path),
     metavar="FILE.glb",
     help="Write the motion for other programs (one result file).",
+)
+@click.option(
+    "--mode",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Show a mode of the last linear analysis, by its number in the table.",
 )
 @click.option("--time", type=float, metavar="T", help="Of --png.  [default: half of the run]")
 @click.option(
@@ -102,6 +110,8 @@ class _Asked:
     gif: Path | None
     mp4: Path | None
     gltf: Path | None
+    #: Number of a mode of a linear analysis to show instead of the run.
+    mode: int | None
     #: Width and height of pictures [pixels].
     size: tuple[int, int]
     #: Of the picture [time units of the result].
@@ -115,6 +125,8 @@ class _Asked:
         from mbsim.errors import ModelError
         from mbsim.view.serve import HOST, Served, server
 
+        if self.mode is not None:
+            raise ModelError("--serve shows runs that go on, and no --mode")
         if any((self.output, self.png, self.gif, self.mp4, self.gltf)):
             raise ModelError("--serve writes no files: leave out -o, --png, --gif, --mp4, --gltf")
         served = Served(self.files, self.signals)
@@ -138,11 +150,13 @@ class _Asked:
 
         pictures = {"png": self.png, "gif": self.gif, "mp4": self.mp4}
         check_tools(**pictures)
-        if self.gltf is not None and len(self.files) > 1:
-            raise ModelError("--gltf takes one result file")
+        for given, option in ((self.gltf, "--gltf"), (self.mode, "--mode")):
+            if given is not None and len(self.files) > 1:
+                raise ModelError(f"{option} takes one result file")
         page = self.output
         if page is None and not any((*pictures.values(), self.gltf)):
-            page = Path("-over-".join(names_of(list(self.files))) + ".html")
+            mode = "" if self.mode is None else f"-mode-{self.mode}"
+            page = Path("-over-".join(names_of(list(self.files))) + f"{mode}.html")
         if page is not None:
             check_product(page, "page")
         if self.gltf is not None:
@@ -171,14 +185,27 @@ class _Asked:
         from mbsim.results.reading import open_results
         from mbsim.view.gltf import glb
         from mbsim.view.page import packs_of, page, title_of
-        from mbsim.view.scene import read_scene
 
         with ExitStack() as stack:
-            scenes = [read_scene(stack.enter_context(open_results(file))) for file in self.files]
+            scenes = [
+                self._scene(stack.enter_context(open_results(file)), file) for file in self.files
+            ]
             model = glb(scenes[0]) if self.gltf is not None else b""
             packs = packs_of(scenes, self.signals)
             settings = {"theme": self.theme} if self.theme else {}
             return page(title_of(scenes), settings, packs), packs, model
+
+    def _scene(self, results: Results, file: Path) -> Scene:
+        """Return what is shown of a result file."""
+        from dataclasses import replace
+
+        from mbsim.results.mode_motion import motion_of_mode
+        from mbsim.view.scene import read_scene
+
+        if self.mode is None:
+            return read_scene(results)
+        scene = read_scene(motion_of_mode(results, self.mode))
+        return replace(scene, name=f"{file.stem}, mode {self.mode}")
 
 
 def _rows(packs: Sequence[RunData]) -> str:

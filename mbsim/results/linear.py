@@ -23,7 +23,9 @@ if TYPE_CHECKING:
 Array = np.ndarray[Any, Any]
 #: Group of a result file.
 GROUP = "linear"
-_MATRICES = ("A", "B", "C", "D", "basis")
+_MATRICES = ("A", "B", "C", "D", "basis", "rates")
+#: A table shows no damping that is less than this of a mode.
+_ROUNDING = 1e-9
 _NAMES = ("states", "inputs", "outputs", "numbers")
 
 
@@ -42,7 +44,7 @@ class Mode(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LinearModel:
-    """x' = A x + B u, y = C x + D u about the present state and inputs.
+    """x' = rates + A x + B u, y = C x + D u, all but rates and A as changes from where it is.
 
     Attributes
     ----------
@@ -56,6 +58,8 @@ class LinearModel:
         All positions, turns, velocities and states; of them `states` are enough.
     basis : ndarray, shape (len(numbers), n)
         All numbers as they follow from the states.
+    rates : ndarray, shape (n,)
+        x' where it is: 0 of a model at rest. Eigenvalues of one that moves depend on the states.
     time : float
         When [T].
     """
@@ -69,6 +73,7 @@ class LinearModel:
     outputs: tuple[str, ...]
     numbers: tuple[str, ...]
     basis: Array
+    rates: Array
     time: float = 0.0
 
     @property
@@ -112,8 +117,11 @@ class LinearModel:
         lines = [f"{'mode':>4} {'frequency ' + per:>18} {'damping ratio':>14} eigenvalue {per}"]
         for k, mode in enumerate(self.modes, 1):
             real, imaginary = mode.eigenvalue.real, mode.eigenvalue.imag
+            ratio = mode.damping_ratio
+            if abs(real) < _ROUNDING * abs(imaginary):
+                real = ratio = 0.0
             value = f"{real:.9g} +- {imaginary:.9g}i" if imaginary else f"{real:.9g}"
-            lines.append(f"{k:>4} {mode.frequency:>18.9g} {mode.damping_ratio:>14.6g} {value}")
+            lines.append(f"{k:>4} {mode.frequency:>18.9g} {ratio:>14.6g} {value}")
         return lines
 
     def tables(self, path: str) -> dict[str, Array]:
@@ -155,7 +163,14 @@ def from_tables(tables: Mapping[str, Array], facts: Mapping[str, Any]) -> Linear
     found: dict[str, Any] = {name: np.asarray(tables[name], dtype=np.float64) for name in _MATRICES}
     sizes = {name: len(each) for name, each in names.items()}
     n, m, p = sizes["states"], sizes["inputs"], sizes["outputs"]
-    shapes = {"A": (n, n), "B": (n, m), "C": (p, n), "D": (p, m), "basis": (sizes["numbers"], n)}
+    shapes: dict[str, tuple[int, ...]] = {
+        "A": (n, n),
+        "B": (n, m),
+        "C": (p, n),
+        "D": (p, m),
+        "basis": (sizes["numbers"], n),
+    }
+    shapes["rates"] = (n,)
     for name, shape in shapes.items():
         if found[name].shape != shape:
             raise ValueError(f"{GROUP}: {name} is {found[name].shape} and not {shape}")

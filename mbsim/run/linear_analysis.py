@@ -118,6 +118,8 @@ class LinearAnalyses:
             f"linear at time {run.time:.9g}: {len(model.states)} states, "
             f"{len(model.inputs)} inputs, {len(model.outputs)} outputs"
         )
+        if model.rates.any():
+            tell("linear: the model moves here: eigenvalues are those of the states in /linear")
         if asked.eigen_analysis:
             for line in model.table(self._unit):
                 tell(line)

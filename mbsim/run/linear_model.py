@@ -34,6 +34,8 @@ _KINDS = ("position", "turn", "velocity", "angular_velocity")
 _RANK = 1e-6
 #: By how much A may differ between two c, and from differences, over its largest number.
 _AGREES, _DIFFERS = 1e-6, 1e-3
+#: Rates below this part of A's largest number are those of a model at rest.
+_AT_REST = 1e-6
 #: Half of the step of differences, of lengths and speeds over the model's own.
 _STEP = 1e-5
 
@@ -222,7 +224,7 @@ def _linearized(run: Standing, outputs: tuple[str, ...], inputs: tuple[str, ...]
     scale = point.scale
     chosen, V = _independent(point.free(), point.nb)
     A = _resolved(point, problem, chosen, V)
-    slopes, sides, C = _differences(run, point, (chosen, V), outputs)
+    slopes, sides, C, rates = _differences(run, point, (chosen, V), outputs)
     size = max(float(np.abs(slopes).max(initial=0.0)), 1e-300)
     if A is None or np.abs(A - slopes).max(initial=0.0) > _DIFFERS * size:
         # implicit methods leave out how constraints turn with bodies that move
@@ -251,6 +253,8 @@ def _linearized(run: Standing, outputs: tuple[str, ...], inputs: tuple[str, ...]
         outputs,
         tuple(point.names),
         V * scale[:, None] / unit,
+        # what a search for rest has left is no motion
+        np.where(np.abs(rates) > _AT_REST * size, rates, 0.0) * unit,
         run.time,
     )
 
@@ -273,8 +277,8 @@ def _resolved(point: _Point, problem: Any, chosen: list[int], V: Array) -> Array
 
 def _differences(
     run: Standing, point: _Point, states: tuple[list[int], Array], outputs: tuple[str, ...]
-) -> tuple[Array, float, Array]:
-    """Return A by central differences, how much those to one side differ at most, and C."""
+) -> tuple[Array, float, Array, Array]:
+    """Return A by central differences, how much those to one side differ at most, C, and x'."""
     chosen, V = states
     scale, n = point.scale, len(chosen)
     A, C, sides = np.zeros((n, n)), np.zeros((len(outputs), n)), 0.0
@@ -287,7 +291,7 @@ def _differences(
         sides = max(sides, float(np.abs(up + down - 2.0 * here).max(initial=0.0)) / _STEP)
         seen = [_read(run, y, outputs) for y in ends]
         C[:, k] = (seen[0] - seen[1]) / (2.0 * _STEP)
-    return A, sides, C
+    return A, sides, C, here
 
 
 def _read(run: Standing, y: Array, outputs: tuple[str, ...]) -> Array:
