@@ -121,7 +121,7 @@ def _look(model: str, overrides: tuple[str, ...]) -> _Found:
     deck = read_model(model, overrides)
     plans = plan_pairs(deck)
     check_expressions(deck)
-    check_libraries(deck.contacts.values())
+    check_libraries(deck)
     # values that a run would refuse; times may still come from the command line
     notes = settle(deck).notes if deck.simulations else ()
 

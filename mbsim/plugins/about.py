@@ -9,7 +9,7 @@ from typing import Any
 from mbsim.model.elements import Subroutine
 from mbsim.plugins.dependence import dependence
 from mbsim.plugins.permission import named, not_run
-from mbsim.plugins.source.find import find_script, find_source
+from mbsim.plugins.source.find import find_either, find_source
 from mbsim.plugins.source.octave import OctaveFile
 from mbsim.plugins.source.script import Scripts, user_function
 from mbsim.plugins.source.shared_library import Library, choose
@@ -54,7 +54,7 @@ def about(
     if not named(user, plugin_files):
         return facts | not_run(user)
     if prefix in ("usrsub", "ROUTINE"):
-        source: Any = find_script(user, user.fnc_name, element, prefix, plugin_files, scripts)
+        source: Any = find_either(user, user.fnc_name, element, prefix, plugin_files, scripts)
     else:
         source = find_source(user, user.fnc_name, element, prefix, plugin_files, scripts)
     facts["file"] = str(source.path)

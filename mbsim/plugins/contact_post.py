@@ -11,8 +11,10 @@ from mbsim.model.elements import Contact, Subroutine
 from mbsim.plugins import guard
 from mbsim.plugins.helpers import Pair, host
 from mbsim.plugins.permission import watched
-from mbsim.plugins.source.find import find_script
+from mbsim.plugins.source.find import find_either
+from mbsim.plugins.source.native import asks, native
 from mbsim.plugins.source.script import Scripts, user_function
+from mbsim.plugins.source.shared_library import Library
 
 #: Names of the arguments, in order.
 CONTACTPOST = "id, i_gra_id, j_gra_id, time, par, npar, iflag, endflg"
@@ -71,8 +73,12 @@ def load_post(contact: Contact, plugin_files: Sequence[Path], scripts: Scripts) 
     """
     assert contact.cpost is not None
     element, name = f"Force_Contact[{contact.id}]", contact.cpost.fnc_name
-    script = find_script(contact.cpost, name, element, "cpost", plugin_files, scripts)
-    function = user_function(script, name, element, CONTACTPOST)
+    script = find_either(contact.cpost, name, element, "cpost", plugin_files, scripts)
+    if isinstance(script, Library):
+        asks(script)
+        function, _ = native(script, name, "cpost", contact.cpost.language, 0)
+    else:
+        function = user_function(script, name, element, CONTACTPOST)
     post = ContactPost(contact, function, script.path, contact.cpost)
     host.shown.clear()
     post.call((contact.i_graphics_id[0], contact.j_graphics_id[0]), 0.0, iflag=1)

@@ -19,9 +19,11 @@ from mbsim.model.names import element_name, is_adams
 from mbsim.model.subroutines import Call, Wanted
 from mbsim.plugins import guard
 from mbsim.plugins.helpers import host
-from mbsim.plugins.source.find import find_script
+from mbsim.plugins.source.find import find_either
+from mbsim.plugins.source.native import asks, native
 from mbsim.plugins.source.octave import end_all
 from mbsim.plugins.source.script import Scripts, user_function
+from mbsim.plugins.source.shared_library import Library
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +46,8 @@ class UserSubroutine:
         Whether it may ask for functions of the language by `py_sysfnc`.
     acts : bool
         Whether motion may follow from what it gives.
+    how : str
+        ``interpreted``, or the language of a library.
     """
 
     address: int
@@ -53,6 +57,7 @@ class UserSubroutine:
     element: tuple[str, int]
     looks: bool
     acts: bool = True
+    how: str = "interpreted"
     keep: Any = field(default=None, repr=False)
 
     def called(self, time: float, results: npt.NDArray[np.float64]) -> int:
@@ -72,11 +77,17 @@ def load_subroutine(
     """
     user, title = each.user, element_name(deck, each.statement, each.id)
     prefix = "ROUTINE" if is_adams(deck) else "usrsub"
-    script = find_script(user, user.fnc_name, title, prefix, plugin_files, scripts)
-    function = user_function(script, user.fnc_name, title, each.call.value)
+    script = find_either(user, user.fnc_name, title, prefix, plugin_files, scripts)
+    if isinstance(script, Library):
+        count = 1 if each.call is Call.MOTION else each.results
+        function, how = native(script, user.fnc_name, prefix, user.language, count)
+        looks = asks(script)
+    else:
+        function = user_function(script, user.fnc_name, title, each.call.value)
+        looks, how = script.looks, "interpreted"
     place = user.fnc_name, str(script.path)
     address, keep = guard.state_callback(function, title, place, each)
-    looks = script.looks and each.call is not Call.MOTION
+    looks = looks and each.call is not Call.MOTION
     return UserSubroutine(
         address,
         each.results,
@@ -85,6 +96,7 @@ def load_subroutine(
         (each.statement, each.id),
         looks,
         each.kind != "REQUEST",
+        how,
         keep,
     )
 

@@ -32,7 +32,7 @@ from mbsim.reader.kinds import (
 )
 from mbsim.reader.normal_force import DEFAULT_SPEED, check_normal, note_unused, warn_default_speed
 from mbsim.reader.statement import NAMED, Entry, Spec, Statement
-from mbsim.reader.subroutine import subroutine
+from mbsim.reader.subroutine import LANGUAGE, subroutine
 
 _SPEEDS = ("stiction_trans_vel", "friction_trans_vel")
 _RADIUS = "patch_radius"
@@ -80,12 +80,13 @@ def _build_contact(entry: Entry) -> None:
         entry.fault(message, _STIFFNESS)
     if cff_type == "STICTION":
         _check_rigid(entry)
-    posts = any(entry.given(name) for name in _POST)
+    post_library = entry.get("cpost_dll_name", "NULL").strip().upper() not in ("", "NULL")
+    posts = post_library or any(entry.given(name) for name in _POST)
     asks_user = _asks_user(entry, cff_type)
     cff = subroutine(entry, "cff", "CFFSUB") if asks_user else el.Subroutine()
     cnf = subroutine(entry, "cnf", "CNFSUB") if cnf_type == "USERCNF" else el.Subroutine()
     cpost = subroutine(entry, "cpost", "CONTACTPOST") if posts else None
-    scripted = (asks_user and not cff.dll_name) or posts
+    scripted = (asks_user and not cff.dll_name) or (posts and not post_library)
     if not scripted and not (cnf_type == "USERCNF" and not cnf.dll_name):
         note_unused(entry, "no subroutine in a script", {"script_name", "interpreter"})
 
@@ -212,9 +213,10 @@ def check_coefficients(entry: Entry) -> None:
         entry.warn(f"larger than mu_static ({mu_static:g})", "mu_dynamic")
 
 
-LANGUAGE = keyword(spellings(C="", FORTRAN=""))
-_POST = ("cpost_param_string", "cpost_fnc_name", "cpost_script_name", "cpost_interpreter")
-_POST_IN_PYTHON = "CONTACTPOST is called in Python alone: name a script by cpost_script_name"
+_POST = (
+    *("cpost_param_string", "cpost_fnc_name", "cpost_language"),
+    *("cpost_script_name", "cpost_interpreter"),
+)
 _NOT_BUILT = "is documented but not built yet"
 FORCE_CONTACT = Statement(
     "Force_Contact",
@@ -311,7 +313,8 @@ FORCE_CONTACT = Statement(
         ),
         "cpost_param_string": Spec(USER, "par of CONTACTPOST", "", "USER()"),
         "cpost_fnc_name": Spec(TEXT, "function called at output times", "", "CONTACTPOST"),
-        "cpost_dll_name": Spec(TEXT, refused=_POST_IN_PYTHON, harmless="NULL"),
+        "cpost_dll_name": Spec(TEXT, "its shared library, or NULL", "", "NULL"),
+        "cpost_language": Spec(LANGUAGE, "its language, where its name does not tell"),
         "cpost_script_name": Spec(TEXT, "its file", "", "script_name"),
         "cpost_interpreter": Spec(keyword(spellings(PYTHON="")), "its language", "", "PYTHON"),
     },

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, get_args, get_type_hints
 
 from mbsim.expressions import Expression
-from mbsim.forces.catalog import FORCES, USERS, ForceKind, Parameter, Reading
+from mbsim.forces.catalog import FORCES, USERS, ForceKind, OfResidual, Parameter, Reading
 from mbsim.model import elements as el
 from mbsim.reader.contact import CFF_ALL, CFF_USES, FORCE_CONTACT, check_coulomb
 from mbsim.reader.keywords import CFF_OF_JOINTS, CNF_OF_LIMITS, spellings
@@ -114,7 +114,8 @@ class _Given:
         return by_user(self.entry, expressions)
 
     def subroutine(self, default: str) -> el.Subroutine:
-        return subroutine(self.entry, "usrsub", default)
+        libraries = not isinstance(FORCES[self.name].form, OfResidual)
+        return subroutine(self.entry, "usrsub", default, libraries)
 
     def result(self, user: el.Subroutine, component: int = 0) -> Expression:
         return result(self.entry, self.name, user, component)

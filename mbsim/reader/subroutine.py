@@ -7,15 +7,17 @@ from pathlib import Path
 
 from mbsim.expressions.tree import Expression, UserResult
 from mbsim.model import elements as el
-from mbsim.reader.keywords import BY_EXPRESSION, BY_USERSUB
+from mbsim.reader.keywords import BY_EXPRESSION, BY_USERSUB, spellings
 from mbsim.reader.kinds import TEXT, USER, keyword
 from mbsim.reader.statement import Entry, Spec
 
+LANGUAGE = keyword(spellings(C="", FORTRAN=""))
 #: Attributes of a statement that takes a user subroutine in place of an expression.
 USERSUB = {
     "usrsub_param_string": Spec(USER, "par of the user's function; it stands for expressions"),
     "usrsub_fnc_name": Spec(TEXT, "name of the user's function", "", "see below"),
-    "usrsub_dll_name": Spec(TEXT, "NULL; libraries are for Force_Contact alone", "", "NULL"),
+    "usrsub_dll_name": Spec(TEXT, "its shared library, relative to the deck, or NULL", "", "NULL"),
+    "usrsub_language": Spec(LANGUAGE, "C or FORTRAN, where the library's names do not tell"),
     "script_name": Spec(TEXT, "its file, relative to the deck; or --plugin"),
     "interpreter": Spec(TEXT, "its language", "", "PYTHON"),
 }
@@ -24,7 +26,7 @@ BY_EITHER = keyword({**BY_EXPRESSION, **BY_USERSUB})
 GIVEN_BY = Spec(BY_EITHER, "how it is given", "", "by what is given")
 
 
-def subroutine(entry: Entry, prefix: str, default: str) -> el.Subroutine:
+def subroutine(entry: Entry, prefix: str, default: str, libraries: bool = True) -> el.Subroutine:
     """Return the user subroutine of an element.
 
     Parameters
@@ -34,8 +36,10 @@ def subroutine(entry: Entry, prefix: str, default: str) -> el.Subroutine:
         Of its attributes: ``cff``, ``cnf``, ``cpost``, ``usrsub``.
     default : str
         The function, where ``<prefix>_fnc_name`` does not name one.
+    libraries : bool
+        Whether it may be of a shared library.
     """
-    dll = _library(entry, prefix)
+    dll = _library(entry, prefix, libraries)
     named = f"{prefix}_script_name" if entry.given(f"{prefix}_script_name") else "script_name"
     script = entry.get(named, "")
     if script:
@@ -59,14 +63,14 @@ def subroutine(entry: Entry, prefix: str, default: str) -> el.Subroutine:
     )
 
 
-def _library(entry: Entry, prefix: str) -> str:
+def _library(entry: Entry, prefix: str, libraries: bool) -> str:
     """Return the shared library that an element names, empty where it names none."""
     name = f"{prefix}_dll_name"
     dll = entry.get(name, "NULL").strip()
     if dll.upper() in ("", "NULL"):
         return ""
-    if prefix == "usrsub":
-        entry.fault('shared libraries are for Force_Contact alone; "NULL" names no file', name)
+    if not libraries:
+        entry.fault('a shared library cannot be named here; "NULL" names no file', name)
         return ""
     path = Path(dll.replace("\\", "/"))
     path = path if path.is_absolute() else entry.draft.directory / path

@@ -121,7 +121,9 @@ def _announce(system: System, settings: Settings, said: list[str], tell: Notify)
     for user_subroutine in system.subroutines.values():
         statement, number = user_subroutine.element
         source = user_subroutine.source.name
-        more.append(f"{statement}[{number}]: {user_subroutine.name} of {source}, interpreted")
+        more.append(
+            f"{statement}[{number}]: {user_subroutine.name} of {source}, {user_subroutine.how}"
+        )
         tell(more[-1])
     return more
 

@@ -307,7 +307,7 @@ FAULTS = {
     ),
     "library": (
         "VARIABLE/1, FUNCTION=USER(1)\\ROUTINE=my::F",
-        ('ROUTINE="my::F"', "shared libraries", "FILE.py::NAME"),
+        ('ROUTINE="my::F"', "LIBRARY.so::NAME", "FILE.py::NAME"),
     ),
     "no name": ("VARIABLE/1, FUNCTION=USER(1)\\ROUTINE=a.py::", ("FILE.py::NAME",)),
     "no script": (

@@ -319,7 +319,7 @@ def test_a_script_may_come_with_plugin(tmp_path):
         ('usrsub_param_string="USER(1)" script_name="no.py"', "no such file"),
         (
             'usrsub_param_string="USER(1)" usrsub_dll_name="a.dll"',
-            "shared libraries are for Force_Contact alone",
+            "no such file",
         ),
     ],
 )

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TypeVar
 
 from mbsim.errors import ModelError
-from mbsim.model.elements import Contact, Subroutine
+from mbsim.model.elements import Contact, Model, Subroutine
+from mbsim.model.subroutines import wanted
 from mbsim.plugins.source.octave import SUFFIX, OctaveFile, read_octave
 from mbsim.plugins.source.script import Script, Scripts, load_script, require
 from mbsim.plugins.source.shared_library import Library, choose, is_library, read_library
@@ -15,28 +16,40 @@ from mbsim.plugins.source.shared_library import Library, choose, is_library, rea
 Found = TypeVar("Found", Script, Script | Library | OctaveFile)
 
 
-def check_libraries(contacts: Iterable[Contact]) -> None:
-    """Look for the functions of the libraries that contacts name; none of them is called.
+def check_libraries(model: Model) -> None:
+    """Look for the functions of the libraries that elements name; none of them is called.
 
     Raises
     ------
     ModelError
         With a line for each that is not there, or whose language is not clear.
     """
+    named = [
+        (f"Force_Contact[{contact.id}]", prefix, user)
+        for contact in model.contacts.values()
+        for prefix, user in (("cff", contact.cff), ("cnf", contact.cnf), ("cpost", contact.cpost))
+        if user is not None
+    ]
+    named += [(f"{each.statement}[{each.id}]", "usrsub", each.user) for each in wanted(model)]
     faults = []
-    for contact in contacts:
-        for prefix, user in (("cff", contact.cff), ("cnf", contact.cnf)):
-            if not user.dll_name:
-                continue
-            try:
-                element = f"Force_Contact[{contact.id}]"
-                library = find_source(user, user.fnc_name, element, prefix)
-                assert isinstance(library, Library)
-                choose(library, user.fnc_name, prefix, user.language)
-            except ModelError as error:
-                faults.append(str(error))
+    for element, prefix, user in named:
+        if not user.dll_name:
+            continue
+        try:
+            library = find_source(user, user.fnc_name, element, prefix)
+            assert isinstance(library, Library)
+            choose(library, user.fnc_name, prefix, user.language)
+        except ModelError as error:
+            faults.append(str(error))
     if faults:
         raise ModelError("\n".join(faults))
+
+
+def usersub_folder() -> Path:
+    """Return the folder with what C and Fortran need to ask mbsim: `mbsim_usersub.h`, `.f90`."""
+    home = Path(__file__).parents[2]
+    shipped = home / "examples" / "userfuncs"
+    return shipped if shipped.is_dir() else home.parent / "userfuncs"
 
 
 def find_subroutine(
@@ -104,6 +117,31 @@ def _only_one(loaded: Sequence[Found], name: str, element: str, attribute: str) 
         defined = "; ".join(f"{source.path} defines {source.listed()}" for source in loaded)
         raise ModelError(f'{element}: no plugin file defines {attribute}="{name}": {defined}')
     return found[0]
+
+
+def find_either(
+    user: Subroutine,
+    name: str,
+    element: str,
+    prefix: str,
+    plugin_files: Sequence[Path] = (),
+    scripts: Scripts | None = None,
+) -> Script | Library:
+    """Return the script or library that defines a function which is no law of a contact."""
+    scripts = {} if scripts is None else scripts
+    if user.dll_name.strip().upper() not in ("", "NULL"):
+        place = f"{user.source.file}:{user.source.line}: " if user.source.file else ""
+        return read_library(Path(user.dll_name), place + element)
+    files = list(dict.fromkeys(Path(file).absolute() for file in plugin_files))
+    defining = [file for file in files if is_library(file)]
+    defining = [file for file in defining if read_library(file, element).defines(name)]
+    if user.script_name or not defining:
+        return find_script(user, name, element, prefix, files, scripts)
+    others = [file for file in files if not is_library(file) and file.suffix.lower() != SUFFIX]
+    loaded = [_any_kind(file, element, scripts) for file in (*defining, *others)]
+    found = _only_one(loaded, name, element, f"{prefix}_fnc_name")
+    assert not isinstance(found, OctaveFile)
+    return found
 
 
 def find_script(

@@ -101,18 +101,25 @@ def _parse_either(text: str) -> Any:
     return (USER if re.match(r"USER\s*\(", text, re.IGNORECASE) else EXPRESSION).parse(text)
 
 
+#: Endings of shared libraries.
+LIBRARIES = (".so", ".dll", ".dylib", ".sl")
+
+
 def _parse_routine(text: str) -> str:
     """Return `name`, or `file.py::name`."""
     file, _, name = text.rpartition("::")
     if not name.isidentifier():
         raise BadValueError
-    if file and not file.lower().endswith((".py", ".pyc")):
-        raise BadValueError("shared libraries are not built yet; must be " + ROUTINE.allowed)
+    if file.lower().endswith(LIBRARIES) and name.istitle():
+        # it would be called with addresses of numbers
+        raise BadValueError(f"{name} is Adams' form in C, with a structure: it is not built")
+    if file and not file.lower().endswith((".py", ".pyc", *LIBRARIES)):
+        raise BadValueError("must be " + ROUTINE.allowed)
     return text
 
 
 EXPRESSION_OR_USER = Kind("an expression, or USER(number, number, ...)", _parse_either)
-ROUTINE = Kind("a function's name, or FILE.py::NAME", _parse_routine)
+ROUTINE = Kind("a function's name, or FILE.py::NAME or LIBRARY.so::NAME", _parse_routine)
 IDS_BY_COMMAS = Kind(f"ids {LIST}", _parse_ids)
 ANGLE = Kind("an angle (radians, or degrees with a D as in 90D)", parse_angle)
 ANY = Kind(f"items {LIST}", str)

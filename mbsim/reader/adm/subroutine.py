@@ -7,6 +7,7 @@ from pathlib import Path
 
 from mbsim.expressions.tree import Expression
 from mbsim.model import elements as el
+from mbsim.reader.adm.declare import LIBRARIES
 from mbsim.reader.statement import Entry
 from mbsim.reader.subroutine import result
 
@@ -31,6 +32,8 @@ def routine(entry: Entry, default: str) -> el.Subroutine | None:
         script = os.path.realpath(path)
         if not path.is_file():
             entry.fault("no such file (the path is relative to the deck)", "ROUTINE")
+    if Path(script).suffix.lower() in LIBRARIES:
+        return el.Subroutine(par, name or default, dll_name=script, source=entry.source)
     return el.Subroutine(par, name or default, script_name=script, interpreter="PYTHON")
 
 
