@@ -11,6 +11,17 @@ from mbsim.reader.linear_systems import ControlDraft
 from mbsim.reader.parse import Node
 
 
+@dataclass(frozen=True)
+class GearDraft:
+    """A gear as it is read: it becomes a coupler when markers are known."""
+
+    id: int
+    joint_ids: tuple[int, ...]
+    cv: int
+    label: str = ""
+    source: el.Source = field(default_factory=el.Source)
+
+
 @dataclass
 class Draft:
     """Elements by id and the findings; `broken` holds (statement, id) with a fault of their own.
@@ -29,6 +40,7 @@ class Draft:
     joints: dict[int, el.Joint] = field(default_factory=dict)
     primitives: dict[int, el.Joint] = field(default_factory=dict)
     couplers: dict[int, el.Coupler] = field(default_factory=dict)
+    gears: dict[int, GearDraft] = field(default_factory=dict)
     motions: dict[int, el.Motion] = field(default_factory=dict)
     general_constraints: dict[int, el.GeneralConstraint] = field(default_factory=dict)
     points_on_curves: dict[int, el.PointOnCurve] = field(default_factory=dict)

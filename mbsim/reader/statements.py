@@ -21,6 +21,7 @@ from mbsim.reader.controls import CONTROL_DIFF, SENSOR_EVALUATE, SENSOR_EVENT
 from mbsim.reader.curves import CONSTRAINT_PTCV, REFERENCE_PARAM_CURVE
 from mbsim.reader.draft import Draft
 from mbsim.reader.forces import force_statements
+from mbsim.reader.gears import CONSTRAINT_GEAR
 from mbsim.reader.graphics import POST_GRAPHIC
 from mbsim.reader.keywords import fold, nearest
 from mbsim.reader.linear_analysis import (
@@ -55,6 +56,7 @@ STATEMENTS = (
     CONSTRAINT_COUPLER,
     CONSTRAINT_GENERAL,
     CONSTRAINT_PTCV,
+    CONSTRAINT_GEAR,
     MOTION_JOINT,
     MOTION_MARKER,
     *force_statements(),

@@ -20,6 +20,7 @@ from mbsim.reader.constraints import complete_motions
 from mbsim.reader.controls import complete_sensors
 from mbsim.reader.curves import complete_curves
 from mbsim.reader.draft import Draft
+from mbsim.reader.gears import complete_gears
 from mbsim.reader.keywords import fold
 from mbsim.reader.linear_analysis import check_plants
 from mbsim.reader.linear_systems import expand
@@ -105,6 +106,7 @@ def _read(path: Given, texts: tuple[str, ...]) -> el.Model:
     draft.faults.extend(map(said_so, complete_curves(draft)))
     draft.faults.extend(map(said_so, check_plants(draft)))
     complete_motions(draft)
+    draft.faults.extend(map(said_so, complete_gears(draft, _to_model(draft, deck, ""))))
     model = _to_model(draft, deck, hashlib.sha256(data + draft.more).hexdigest())
     known = Known(frozenset(draft.broken), draft.display_graphics)
     faults, warnings = check_model(model, known)

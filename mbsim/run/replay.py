@@ -23,6 +23,7 @@ from mbsim.core.stored import read_regular
 from mbsim.errors import ModelError
 from mbsim.integrators.catalog import RIGID
 from mbsim.run.activity import Activity
+from mbsim.run.plants import with_plants
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
@@ -121,10 +122,14 @@ class Replay:
             raise ModelError(f"{results.path}: an earlier version made it: run the model again")
         model = read_model(_deck(results), _lines(named["overrides"]))
         self.results = results
-        self.settings = settle(model, float(named["end_time"]), float(named["print_interval"]))
+        # analyses of one time may all be at 0, which nobody asks for
+        end = float(named["end_time"]) or None
+        self.settings = settle(model, end, float(named["print_interval"]))
         plugins = [Path(file) for file in _lines(named["plugins"])]
         interpret, detector = bool(named["interpret_plugins"]), str(named["detector"])
-        self.system: System = build(model, plugins, interpret, detector, lambda line: None)
+        self.system: System = build(
+            with_plants(model), plugins, interpret, detector, lambda line: None
+        )
         self._changes()
         digests = Identity(self.system).digests
         for name, what in (

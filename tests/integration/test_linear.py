@@ -88,3 +88,13 @@ def test_a_pendulum_that_moves():
         at -= 0.5 * k * (cosine**2 - sine**2)
         A = [[0, 1], [at / (0.5 * cosine), -2 * sine * rate / cosine]]
         np.testing.assert_allclose(found.A, A, rtol=1e-6, atol=1e-6)
+
+
+def test_a_request_finds_the_model_of_a_run_with_inputs(tmp_path):
+    from mbsim.run.replay import Replay
+
+    deck = tmp_path / "linear.xml"
+    deck.write_text((CORPUS / "linear.xml").read_text("utf-8"), encoding="utf-8")
+    mbsim.simulate(mbsim.read_model(deck), output=tmp_path)
+    with mbsim.open_results(tmp_path / "linear.h5") as results:
+        assert Replay(results).system.model.looked_at == (2, 3)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mbsim.joints.catalog import JOINTS
-from mbsim.model import elements as el
+from mbsim.model.frames import Frame
 from mbsim.reader.adm.declare import (
     EXPRESSION_OR_USER,
     IDS_BY_COMMAS,
@@ -15,6 +15,8 @@ from mbsim.reader.adm.declare import (
 )
 from mbsim.reader.adm.translate import written
 from mbsim.reader.constraints import CONSTRAINT_COUPLER
+from mbsim.reader.draft import GearDraft
+from mbsim.reader.gears import UnfitGearError, coupler
 from mbsim.reader.kinds import ID, BadValueError, Kind
 from mbsim.reader.parse import Attribute, Node
 from mbsim.reader.statement import Entry, Spec
@@ -81,65 +83,30 @@ COUPLER = AdmStatement(
 
 
 def build_gear(entry: Entry) -> None:
-    """Add a gear: both parts move alike along z of the CV marker at its origin.
-
-    The joints carry the parts on one third part, on which the CV marker is. A part that turns by
-    q about a joint's axis e through p moves by q (e x (c - p)) . z at the CV marker's origin c,
-    and one that slides by q e . z. So a gear is a coupler, with those factors as its scales.
-    """
+    """Add a gear."""
     draft = entry.draft
     ids, cv = entry.get("JOINTS"), draft.markers.get(entry.get("CV", 0))
     if ids is None or len(ids) != 2:
         if ids is not None:
             entry.fault(f"names {len(ids)} joints; a gear has 2", "JOINTS")
         return
-    joints = [draft.joints.get(id) for id in ids]
-    if cv is None or None in joints:
-        what, name = ("JOINT", "JOINTS") if None in joints else ("MARKER", "CV")
+    joints = [draft.joints[id] for id in ids if id in draft.joints]
+    if cv is None or len(joints) != len(ids):
+        what, name = ("JOINT", "JOINTS") if len(joints) != len(ids) else ("MARKER", "CV")
         entry.fault(f"there is no such {what} in the deck", name)
         return
-    found = [_factor(entry, joint, cv) for joint in joints if joint is not None]
-    if None in found:
+    ends = [cv.id, *(id for joint in joints for id in (joint.i_marker_id, joint.j_marker_id))]
+    if any(id not in draft.markers for id in ends):
         return
-    (first, type_of_first), (second, type_of_second) = (each for each in found if each is not None)
-    coupler = el.Coupler(
-        id=entry.get("id", 0),
-        label="GEAR",
-        joint_ids=ids,
-        motion_types=(type_of_first, type_of_second),
-        scales=(first, -second),
-        source=entry.source,
-    )
-    entry.register(draft.couplers, coupler)
-
-
-def _factor(entry: Entry, joint: el.Joint, cv: el.Marker) -> tuple[float, str] | None:
-    """Return how a part moves at the CV marker by a displacement of its joint, R or T of which."""
-    markers = entry.draft.markers
-    i, j = markers.get(joint.i_marker_id), markers.get(joint.j_marker_id)
-    if i is None or j is None:
-        return None
-    if cv.body_id not in (i.body_id, j.body_id):
-        entry.fault(f"is not on a part of joint {joint.id}; must be on the part of both", "CV")
-        return None
-    sign = 1.0 if cv.body_id == j.body_id else -1.0
-    axis, along = j.R[:, 2], cv.R[:, 2]
-    moves = JOINTS[joint.type].moves
-    turning = float(np.cross(axis, np.subtract(cv.pos, j.pos)) @ along) if "R" in moves else 0.0
-    sliding = float(axis @ along) if "T" in moves else 0.0
-    arm = max(float(np.linalg.norm(np.subtract(cv.pos, j.pos))), 1e-300)
-    given = [
-        (sign * factor, type)
-        for factor, type, least in ((turning, "R", 1e-9 * arm), (sliding, "T", 1e-9))
-        if abs(factor) > least
-    ]
-    if len(given) == 1:
-        return given[0]
-    if given:
-        entry.fault(f"joint {joint.id} moves it by turning and by sliding: {_NOT_BUILT[3:]}", "CV")
-    else:
-        entry.fault(f"joint {joint.id} does not move its part along z of it at its origin", "CV")
-    return None
+    # markers of one part are in its frame
+    frames = {id: Frame(np.array(draft.markers[id].pos), draft.markers[id].R) for id in ends}
+    gear = GearDraft(entry.get("id", 0), ids, cv.id, "GEAR", entry.source)
+    try:
+        made = coupler(gear, joints, draft, frames)
+    except UnfitGearError as error:
+        entry.fault(str(error), "JOINTS" if error.is_joint else "CV")
+        return
+    entry.register(draft.couplers, made)
 
 
 GEAR = AdmStatement(
