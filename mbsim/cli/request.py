@@ -31,12 +31,14 @@ from mbsim.cli.options import json_option
 def command(
     result: Path, names: tuple[str, ...], output: Path | None, scripts: bool, as_json: bool
 ) -> None:
-    """Evaluate contact forces again at the output times of RESULT.h5.
+    """Evaluate contact forces, and what is named by espy, again at the output times of RESULT.h5.
 
     NAME is Force_Contact[ID].force (torque, penetration, slip_speed, incidents, area) or
     Force_Contact[ID].incident[K].mu (force, torque, mode, slip, xdot, x, depth, rate, nforce,
     friction, stored, point, normal, area, state0, ..., and what a user's function names by espy),
-    K counting the incidents of the row from 0. /x, /y, /z or /mag after a vector takes one number
+    K counting the incidents of the row from 0. Of other elements it is what rows have,
+    Constraint_Joint[ID].force or Force_Element[ID].UNKNOWN, and what their subroutines name by
+    espy, Force_Scalar_TwoBody[ID].name. /x, /y, /z or /mag after a vector takes one number
     of it. The deck and users' files must be those of the run.
     """
     from mbsim.cli.messages import print_json

@@ -212,6 +212,7 @@ CONSTRAINT_COUPLER = Statement(
         "joint_ids": Spec(IDS, "two or three joints", required=True),
         "motion_types": Spec(WORDS, "R or T, one for each joint", required=True),
         "scales": Spec(REALS, "factor of each joint's displacement", required=True),
+        **{name: Spec(refused="COUSUB is not built; give scales") for name in USERSUB},
     },
     _build_coupler,
     about="a linear relation between displacements of joints",

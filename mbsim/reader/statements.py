@@ -90,7 +90,7 @@ _DOCUMENTED = (
     "Control_PlantOutput Control_SISO Control_StateEqn "
     "Force_Beam Force_Field Force_MultiPoint Force_Penalty "
     "Force_StateEqn Force_TwoBody "
-    "Param_Linear "
+    "Force_FlexModal Force_PTdSF Post_UserAPI Reference_2DCluster Reference_PlantState "
     "Reference_DeformCurve "
     "Reference_DeformSurface Reference_FlexData Reference_Matrix Reference_ParamCurve "
     "Reference_ParamSurface Reference_String "

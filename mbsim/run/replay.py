@@ -72,6 +72,8 @@ class Row:
     time: float
     contacts: dict[int, dict[str, Any]]
     incidents: dict[int, list[dict[str, Any]]] = field(default_factory=dict)
+    # what subroutines of other elements name by espy, by statement and id
+    espied: dict[tuple[str, int], dict[str, Any]] = field(default_factory=dict)
 
 
 def _deck(results: Results) -> str:
@@ -235,6 +237,30 @@ class Replay:
             c = int(scene.kinds.contact[int(row[codes.INC_KIND])])
             given, out, slot = np.split(numbers, np.cumsum(groups)[:-1])
             found.incidents[ids[c]].append(self._incident(c, row, given, out, slot))
+        found.espied = self._espied_by_subroutines(time, y)
+        return found
+
+    def _espied_by_subroutines(self, time: float, y: Array) -> dict[tuple[str, int], Any]:
+        """Return what subroutines in place of expressions name; those of requests know more.
+
+        The row has just been evaluated: measures are those of y.
+        """
+        from mbsim.plugins import host, raise_failure
+
+        found = {}
+        for user in self.system.subroutines.values():
+            if not user.acts or user.how != "interpreted":
+                continue
+            results, outer = np.zeros(max(3, user.count)), host.signals
+            host.signals = {}
+            try:
+                code = user.keep(self._table.ctypes.data, time, y.ctypes.data, results.ctypes.data)
+                named = {name: _plain(value) for name, value in host.signals.items()}
+            finally:
+                host.signals = outer
+            if code != 0:
+                raise_failure()
+            found[user.element] = named
         return found
 
     def _incident(self, c: int, row: Array, given: Array, out: Array, slot: Array) -> Any:
@@ -364,13 +390,31 @@ def request(results: Results, names: Sequence[str]) -> tuple[Array, dict[str, li
     ModelError
         If a name does not exist, or the model is not that of the run any more.
     """
-    again = Replay(results)
-    wanted = [_wanted(name, again.system.contact_ids) for name in names]
-    rows = list(again.rows())
+    from mbsim.run.asked_elements import columns_of, is_of_element
+
+    again: Replay | None = None
+    rows: list[Row] | None = None
+
+    def replayed() -> list[Row]:
+        nonlocal again, rows
+        again = again or Replay(results)
+        rows = list(again.rows()) if rows is None else rows
+        return rows
+
+    others = [name for name in names if not is_of_element(name)]
+    if others:
+        again = Replay(results)
+        for name in others:
+            _wanted(name, again.system.contact_ids)
     columns: dict[str, list[Value]] = {}
-    for each in wanted:
-        columns |= _columns(each, rows)
-    return np.array([row.time for row in rows]), columns
+    for name in names:
+        if is_of_element(name):
+            columns |= columns_of(results, name, lambda: [row.espied for row in replayed()])
+        else:
+            found = replayed()
+            assert again is not None
+            columns |= _columns(_wanted(name, again.system.contact_ids), found)
+    return np.atleast_1d(np.asarray(results["time"], dtype=np.float64)), columns
 
 
 def _columns(wanted: Wanted, rows: Sequence[Row]) -> dict[str, list[Value]]:

@@ -309,3 +309,46 @@ def test_a_shell_completes_what_can_be_asked_of_a_result(held):
     ]
     assert len(asked) > 5
     assert ask(file, *(name for name in asked if not name.endswith("/"))).exit_code == 0
+
+
+def test_signals_of_other_elements_and_what_their_subroutines_name(tmp_path):
+    (tmp_path / "force.py").write_text(
+        "def SFOSUB(id, time, par, npar, dflag, iflag):\n"
+        "    d, errflg = py_sysfnc('DM', [20, 10])\n"
+        "    espy(stretch=d - 0.5, side='long' if d > 0.5 else 'short')\n"
+        "    return -100 * (d - 0.5)\n"
+    )
+    deck = tmp_path / "deck.xml"
+    deck.write_text("""<Deck><Model>
+<Body_Rigid id="1" isground="TRUE"/>
+<Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="0.1" inertia_yy="0.1" inertia_zz="0.1"/>
+<Reference_Marker id="10" body_id="1" a00="0" a20="-1" a02="1" a22="0"/>
+<Reference_Marker id="20" body_id="2" pos_x="0.6" a00="0" a20="-1" a02="1" a22="0"/>
+<Constraint_Joint id="3" type="TRANSLATIONAL" i_marker_id="20" j_marker_id="10"/>
+<Force_Scalar_TwoBody id="7" type="Force" i_marker_id="20" j_marker_id="10"
+ usrsub_param_string="USER()" script_name="force.py"/>
+<Force_SpringDamper id="8" type="TRANSLATIONAL" i_marker_id="20" j_marker_id="10" stiffness="10"
+ length="0.5"/>
+<Force_Gravity grav_z="-9.81"/>
+<Post_Request id="1" type="EXPRESSION" expr1="DM(20,10)"/>
+</Model><Command><Simulate analysis_type="Transient" end_time="0.4" print_interval="0.1"/></Command>
+</Deck>""")
+    mbsim.simulate(mbsim.read_model(deck), output=tmp_path)
+    with mbsim.open_results(tmp_path / "deck.h5") as results:
+        stretch = results["requests/1/F1"] - 0.5
+        names = ["Force_Scalar_TwoBody[7].stretch", "force_scalar_twobody[7].side"]
+        names += ["Constraint_Joint[3].force/z", "Force_SpringDamper[8].force"]
+        time, columns = request(results, names)
+        np.testing.assert_array_equal(time, results["time"])
+        np.testing.assert_allclose(columns[names[0]], stretch, atol=1e-15)
+        assert columns[names[1]] == ["long" if d > 0 else "short" for d in stretch]
+        np.testing.assert_allclose(columns[names[2]], 9.81)
+        np.testing.assert_allclose(columns["Force_SpringDamper[8].force/x"], -10 * stretch)
+        for name, said in (
+            ("Constraint_Joint[3].length", "there are force, torque"),
+            ("Force_SpringDamper[9].force", "no such element"),
+            ("Force_Scalar_TwoBody[7].strain", "there are force, torque, stretch, side"),
+            ("Force_SpringDamper[8].force/w", "there are /x, /y, /z, /mag"),
+        ):
+            with pytest.raises(ModelError, match=said):
+                request(results, [name])
