@@ -88,7 +88,13 @@ def _build_primitive(entry: Entry) -> None:
 
 
 def _build_coupler(entry: Entry) -> None:
-    """Add a coupler of two or three joints."""
+    """Add a coupler of two or three joints, spelled joint by joint or as lists."""
+    if any(entry.given(name) for name in _BY_JOINT):
+        _build_coupler_by_joint(entry)
+        return
+    for name in ("joint_ids", "motion_types", "scales"):
+        if not entry.given(name):
+            entry.fault(f"{name}: missing; must be {_kind(entry, name)}")
     ids = entry.get("joint_ids", ())
     if entry.get("joint_ids") is not None and len(ids) not in (2, 3):
         entry.fault(f"names {len(ids)} joints; a coupler has 2 or 3", "joint_ids")
@@ -107,6 +113,36 @@ def _build_coupler(entry: Entry) -> None:
         joint_ids=ids,
         motion_types=entry.get("motion_types", ()),
         scales=entry.get("scales", ()),
+        source=entry.source,
+    )
+    entry.register(entry.draft.couplers, coupler)
+
+
+def _build_coupler_by_joint(entry: Entry) -> None:
+    """Add a coupler as MotionSolve spells it."""
+    for name in ("joint_ids", "motion_types", "scales"):
+        if entry.given(name):
+            entry.fault("goes with joint_ids, motion_types and scales, not with joint1_id", name)
+    third = ("joint3_id", "freedom_3")
+    needed = [*_BY_JOINT[:4], *(third if any(map(entry.given, third)) else ()), "coefficients"]
+    for name in needed:
+        if not entry.given(name):
+            entry.fault(f"{name}: missing; must be {_kind(entry, name)}")
+    ids = [entry.get(name) for name in needed[:-1:2]]
+    types = [entry.get(name) for name in needed[1:-1:2]]
+    scales = entry.get("coefficients")
+    if None in (*ids, *types, scales):
+        return
+    if len(scales) != len(ids):
+        entry.fault(f"must have one value for each of the {len(ids)} joints", "coefficients")
+    if any(scale == 0.0 for scale in scales):
+        entry.fault("must be numbers other than 0", "coefficients")
+    coupler = el.Coupler(
+        id=entry.get("id", 0),
+        label=entry.get("label", ""),
+        joint_ids=tuple(ids),
+        motion_types=tuple(types),
+        scales=scales,
         source=entry.source,
     )
     entry.register(entry.draft.couplers, coupler)
@@ -205,14 +241,27 @@ CONSTRAINT_JPRIM = Statement(
     _build_primitive,
     about="a joint primitive, with ids of its own",
 )
+#: How MotionSolve spells a coupler.
+_BY_JOINT = (
+    *("joint1_id", "freedom_1", "joint2_id", "freedom_2", "joint3_id", "freedom_3"),
+    "coefficients",
+)
 CONSTRAINT_COUPLER = Statement(
     "Constraint_Coupler",
     {
         **NAMED,
-        "joint_ids": Spec(IDS, "two or three joints", required=True),
-        "motion_types": Spec(WORDS, "R or T, one for each joint", required=True),
-        "scales": Spec(REALS, "factor of each joint's displacement", required=True),
-        **{name: Spec(refused="COUSUB is not built; give scales") for name in USERSUB},
+        **{
+            name: Spec(ID, f"joint {name[5]}")
+            if name.endswith("id")
+            else Spec(keyword(DIRECTIONS), f"R turns, T slides, of joint {name[-1]}")
+            for name in _BY_JOINT[:-1]
+        },
+        "coefficients": Spec(REALS, "factor of each joint's displacement"),
+        "joint_ids": Spec(IDS, "two or three joints, as a list"),  # ours
+        "motion_types": Spec(WORDS, "R or T, one for each joint, as a list"),
+        "scales": Spec(REALS, "coefficients that go with joint_ids"),
+        "is_virtual": Spec(FLAG, refused="virtual couplers are not built", harmless="false"),
+        **{name: Spec(refused="COUSUB is not built; give coefficients") for name in USERSUB},
     },
     _build_coupler,
     about="a linear relation between displacements of joints",
