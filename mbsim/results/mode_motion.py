@@ -53,7 +53,8 @@ def motion_of_mode(results: Results, number: int) -> Results:
     amplitude = min(_FAR * size / max(far, 1e-300), _TURN / max(turn, 1e-300))
     swings = abs(mode.eigenvalue.imag) / (2.0 * math.pi) or 1.0
     periods = np.arange(_ROWS * _PERIODS + 1) / _ROWS
-    moved = amplitude * np.real(np.exp(2j * math.pi * periods)[:, None, None, None] * shape)
+    swing = amplitude * np.exp(2j * math.pi * periods)[:, None, None]
+    shift, turns = (np.real(swing * each) for each in shape)
 
     file = MemoryFile()
     source, *_ = results.located("time")
@@ -63,8 +64,8 @@ def motion_of_mode(results: Results, number: int) -> Results:
     p = np.stack([results[f"bodies/{id}/position"][rows[-1]] for id in ids])
     q = np.stack([results[f"bodies/{id}/quaternion"][rows[-1]] for id in ids])
     file.create_dataset("time", periods / swings)
-    file.create_dataset("bodies/position", p + moved[:, 0])
-    file.create_dataset("bodies/quaternion", _turned(q, moved[:, 1]))
+    file.create_dataset("bodies/position", p + shift)
+    file.create_dataset("bodies/quaternion", _turned(q, turns))
     return Results(file, None)
 
 
