@@ -276,9 +276,9 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
     ),
     # documented, not built
     "gear": (
-        added('<Constraint_Gear id="1" i_marker_id="10" j_marker_id="20"/>'),
+        added('<Constraint_PTCV id="1" i_marker_id="10" j_marker_id="20"/>'),
         END_OF_MODEL,
-        ("Constraint_Gear[1]", "not built yet"),
+        ("Constraint_PTCV[1]", "not built yet"),
     ),
     "spring": (added('<Force_SpringDamper id="1"/>'), END_OF_MODEL, ("Force_SpringDamper[1]",)),
     "sensor": (
@@ -360,10 +360,10 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
         GRAVITY_LINE,
         ("Force_Gravity", 'grav_z="-9.81*DZ(20)"', "uses DZ", "an expression of TIME"),
     ),
-    "linear analysis": (
-        deck(('"Transient"', '"Linear"')),
+    "frequency analysis": (
+        deck(('"Transient"', '"Frequency Response"')),
         SIMULATE_LINE,
-        ("Simulate", 'analysis_type="Linear"', "TRANSIENT"),
+        ("Simulate", 'analysis_type="Frequency Response"', "TRANSIENT"),
     ),
     "print_increment": (
         deck(('print_interval="0.01"', 'print_increment="5"')),
