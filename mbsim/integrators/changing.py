@@ -8,10 +8,11 @@ The error lets steps go beyond that bound; where many are at it, they are kept w
 The implicit method tries an explicit step now and then. What its own last steps took, less what
 explicit ones would have taken instead, is summed up; where that is as much as it would cost to be
 wrong, and two trials agree, the explicit method goes on. `Methods.change_over` learns from what
-came of a change. A run that is stiff from its begin begins anew: `Methods.begin_anew`. Where the
-rate at the begin, measured (`rates.largest_rate`), would bound very many steps, it does so at once.
-That rate is asked for as well before the implicit method is left: the stages of a trial on a motion
-that holds what is fast tell nothing of that.
+came of a change. A run that is stiff from its begin begins anew: `Methods.begin_anew`. So does one
+that explicit steps have thrown by then. Where the rate at the begin, measured
+(`rates.largest_rate`), would bound very many steps, it does so at once. That rate is asked for as
+well before the implicit method is left: the stages of a trial on a motion that holds what is fast
+tell nothing of that.
 
 How many steps are ahead is judged by the pace of the run so far, and of the last WINDOW steps once
 there are so many: an impact after a flight takes little of the run, and is over before there are.
@@ -79,6 +80,9 @@ THROWS = 0.1
 STEADY = 3
 #: Steps found stiff before AUTO changes over, and others that make it forget them.
 FIRST_PATIENCE, FORGET = 15, 6
+#: A run that changes over within so many steps has been stiff from its begin: going back there
+#: costs about what the implicit method takes until it runs well from anywhere else.
+BEGIN_STEPS = 4 * FIRST_PATIENCE
 #: Steps over which their number a time is taken: an impact is shorter.
 WINDOW = 200
 #: Of the explicit method, where nothing is taken again: what work is counted in.
@@ -89,6 +93,8 @@ WORTH, WORTH_AGAIN = 800, 200
 #: It is worth it for the first time as well where so many are saved, if steps at the bound go on as
 #: they do. How much longer implicit ones are the error of RECENT ones tells.
 WORTH_SMOOTH, RECENT = 100, 5.0
+#: And where a run that has just begun is thrown by its steps at the bound: it begins anew.
+WORTH_THROWN = 300
 #: At the begin, where the largest rate is measured: what is lost if it was wrong is small then.
 WORTH_AT_ONCE = 4000
 #: With so many ahead the implicit method is tried after as many steps as there is patience for.
@@ -194,6 +200,18 @@ def begins_stiff(m: Method, steps: Steps, t_end: float) -> bool:
 
 
 @jitable
+def is_thrown(m: Method, ahead: float) -> bool:
+    """Return whether steps at the bound of stability have thrown what rests, soon after the begin.
+
+    What flies about then is not the model's motion, and bounces for long; from the begin on the
+    implicit method does not throw it. A step that was cut at a switch is short for that.
+    """
+    began = m.memory[COSTLY] == math.inf and m.counts[STEPS] <= BEGIN_STEPS
+    thrown = m.memory[WAS_CUT] == 0.0 and m.memory[LAST_STEP] < THROWS * m.memory[STIFF_STEP]
+    return began and thrown and m.memory[STIFF_STEPS] >= STEADY and ahead > WORTH_THROWN
+
+
+@jitable
 def is_stiff(m: Method, steps: Steps, h: float, t_end: float) -> bool:
     """Note what the last explicit step found; return whether to change over."""
     t = m.memory[TIME]
@@ -213,6 +231,10 @@ def is_stiff(m: Method, steps: Steps, h: float, t_end: float) -> bool:
         enough = ahead > WORTH_AGAIN
     if enough and m.memory[STIFF_STEPS] > 1.0:
         m.memory[BOUNDED] = 1.0
+    if is_thrown(m, ahead):
+        # no more steps at the bound are needed to know
+        m.memory[STIFF_STEPS] = m.memory[PATIENCE]
+        return True
     # as many steps a time as when it was stiff: it is so again, though nothing else may show it
     again = m.memory[PACE] >= m.memory[COSTLY] and taken >= max(WINDOW, m.memory[PATIENCE])
     if again or m.memory[STIFF_STEPS] >= m.memory[PATIENCE]:

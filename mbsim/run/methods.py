@@ -17,6 +17,7 @@ from mbsim.errors import ModelError
 from mbsim.integrators import catalog, scheme
 from mbsim.integrators.binding import bind
 from mbsim.integrators.changing import (
+    BEGIN_STEPS,
     EVALUATIONS_A_STEP,
     FIRST_PATIENCE,
     IMPLICIT_START,
@@ -35,9 +36,6 @@ MOST_BODIES = 300
 #: FEW bodies, and implicit ones: what samples cost is then about 1 % of the steps, or less.
 EVERY, EVERY_OF_MANY, EVERY_IMPLICIT = 8.0, 16.0, 1.0
 FEW = 16
-#: A run that changes over within so many steps has been stiff from its begin: going back there
-#: costs about what the implicit method takes until it runs well from anywhere else.
-BEGIN_STEPS = 4 * FIRST_PATIENCE
 #: By how much AUTO is slower to change after what did not pay, at most.
 MOST_LEARNT = 16.0
 #: The part of a step's error that Newton's iteration may leave where friction holds without give.
