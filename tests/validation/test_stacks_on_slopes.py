@@ -115,3 +115,11 @@ def test_a_stack_on_a_slope_needs_few_steps(method, tol, boxes, law, end, steps,
     results = run_deck(tmp_path, model, end, end / 50.0, integrator=method, tol=tol)
     assert results["time"][-1] == pytest.approx(end)
     assert results.stats["steps"] < steps
+
+
+@pytest.mark.parametrize("which", [(), (1, 2)])
+def test_what_has_just_touched_is_not_said_to_be_above_its_cone(which, tmp_path):
+    """It is held by 1e-9 of what presses most, though less presses: friction was 1 above mu N."""
+    boxes = stack(3, 0.1, 1.0, 0.1, **rigid(1e6, 1.5, 500.0, 0.4))
+    results = run_deck(tmp_path, of_meshes(boxes, which), 0.005, 0.001, integrator="AUTO", tol=1e-4)
+    assert results.audit.warnings == ()

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import CHANGED, CONSTRAINTS_CHANGED, NOW, STICK
+from mbsim.arrays.codes import (
+    CHANGED,
+    CONSTRAINTS_CHANGED,
+    NOW,
+    SCALE_LENGTH,
+    SCALE_SPEED,
+    STICK,
+)
 from mbsim.arrays.codes import SLIP as SLIP_EVENT
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
@@ -46,6 +53,12 @@ from mbsim.laws.abi import (
     TIME_IN,
     UNIT_OUT,
 )
+from mbsim.laws.friction.stiction import MU_STATIC
+
+#: What presses less than this part of what presses most, or of what the model's own acceleration
+#: V^2/L makes of the mass that slips, counts as that: no limit is 0. Less is nothing to the motion,
+#: and where shapes have just touched it is rounding: depths have no digits for it.
+LEAST_PART = 1e-9
 
 
 @jitable
@@ -58,6 +71,17 @@ def slipping_mass(scene: Scene, s: int) -> float:
             inverse += 1.0 / scene.bodies.mass[b]
     points = max(1, scene.pairs.touches[scene.slots.pair[s]])
     return 1.0 / (points * inverse) if inverse > 0.0 else 0.0
+
+
+@jitable
+def least_limit(scene: Scene, s: int, most: float) -> float:
+    """Return what friction without give in slot s is taken to hold at least [F].
+
+    `most` is what such friction holds at most in any slot.
+    """
+    mu, size = scene.contacts.friction_par[contact_of(scene, s), MU_STATIC], scene.world.scale
+    push = slipping_mass(scene, s) * size[SCALE_SPEED] ** 2 / size[SCALE_LENGTH]
+    return LEAST_PART * max(most, mu * push)
 
 
 @jitable

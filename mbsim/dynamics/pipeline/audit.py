@@ -93,6 +93,7 @@ from mbsim.dynamics.constraints.equations import MISMATCH, RESIDUAL
 from mbsim.dynamics.constraints.folding import is_sticking
 from mbsim.dynamics.constraints.in_use import active_count, is_friction
 from mbsim.dynamics.contact.forces import FORCE, NORMAL, contact_of, pressing, sides
+from mbsim.dynamics.contact.memory import least_limit
 from mbsim.dynamics.pipeline.output import fill_energy
 from mbsim.geometry.catalog import AT_NORMAL
 
@@ -344,7 +345,11 @@ def examine_fold(scene: Scene, t: float) -> None:
 @jitable
 def examine_friction(scene: Scene, t: float) -> None:
     """Look whether friction is within its cone at every incident."""
-    audit, work, hit = scene.audit, scene.work, scene.work.hit
+    audit, work, hit, largest = scene.audit, scene.work, scene.work.hit, 0.0
+    for k in range(hit[len(hit) - 1]):
+        c = contact_of(scene, hit[k])
+        if scene.contacts.rigid[c] == 1:
+            largest = max(largest, audit.cone[c] * pressing(scene, hit[k]))
     for k in range(hit[len(hit) - 1]):
         s = hit[k]
         c = contact_of(scene, s)
@@ -354,6 +359,8 @@ def examine_friction(scene: Scene, t: float) -> None:
         normal = dot(force, n)
         tangential = norm(sub(force, scale(normal, n)))
         most = audit.cone[c] * max(0.0, pressing(scene, s))
+        if scene.contacts.rigid[c] == 1:
+            most = max(most, least_limit(scene, s, largest))
         row = audit.contact[c]
         row[LARGEST_FRICTION] = max(row[LARGEST_FRICTION], most)
         if tangential > most + CONE_ROUNDING * abs(normal):

@@ -28,6 +28,7 @@ from mbsim.core.rotation import cross, dot, vector
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.selection import LEVER, fill_size
 from mbsim.dynamics.contact.forces import FORCE, contact_of
+from mbsim.dynamics.contact.memory import least_limit
 from mbsim.dynamics.contact.points import record_event
 from mbsim.dynamics.stiction.cones import CAPACITY, MOVES, SHARED, SLIDE, SLIPPING, solve_cones
 from mbsim.dynamics.stiction.faces import holds_nothing, slip_of
@@ -40,7 +41,6 @@ from mbsim.dynamics.stiction.rigid_shares import (
     fill_cones,
     fill_slip,
     first_of_slots,
-    least_capacity,
     most_capacity,
     part_at_most_of,
     share_sticking,
@@ -284,7 +284,7 @@ def solve_slips(scene: Scene, count: int, r: int, most: float) -> float:
         grows = False
         for k in range(count // 2):
             s = scene.equations.slot[int(cone[WHICH, k])]
-            cone[CAPACITY, k] = (1.0 - OVER) * max(cone[STATIC, k], least_capacity(scene, s, most))
+            cone[CAPACITY, k] = (1.0 - OVER) * max(cone[STATIC, k], least_limit(scene, s, most))
         _, eps = solve_cones(scene.sweep.share, count, r, cone, scene.sweep.mix, SLIPPING)
         for k in range(count // 2):
             slips = math.hypot(cone[SLIDE, 2 * k], cone[SLIDE, 2 * k + 1]) > MOVES * eps
@@ -305,7 +305,7 @@ def solve_mechanism(scene: Scene, count: int, r: int, most: float) -> float:
     cone = scene.sweep.cone
     for k in range(count // 2):
         s = scene.equations.slot[int(cone[WHICH, k])]
-        cone[CAPACITY, k] = max(capacity(scene, s), least_capacity(scene, s, most))
+        cone[CAPACITY, k] = max(capacity(scene, s), least_limit(scene, s, most))
     _, eps = solve_cones(scene.sweep.share, count, r, cone, scene.sweep.mix, SHARED)
     friction = 0.0
     for k in range(count // 2):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import CONE_ROWS, SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.codes import CONE_ROWS
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
@@ -14,16 +14,12 @@ from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.selection import sticks
 from mbsim.dynamics.constraints.tree import respond
 from mbsim.dynamics.contact.forces import FORCE, NORMAL, contact_of
-from mbsim.dynamics.contact.memory import slipping_mass
+from mbsim.dynamics.contact.memory import least_limit
 from mbsim.dynamics.stiction.cones import CAPACITY, LOAD, SHARED, part_at_most, solve_cones
 from mbsim.dynamics.stiction.cones import FORCE as HELD_BY
 from mbsim.geometry.catalog import AT_NORMAL
 from mbsim.laws.friction.stiction import MU_STATIC
 
-#: What presses less than this part of what presses most, or of what the model's own acceleration
-#: V^2/L makes of the mass that slips, counts as that: no limit is 0. Less is nothing to the motion,
-#: and where shapes have just touched it is rounding: depths have no digits for it.
-LEAST_PART = 1e-9
 # last rows of `Sweep.cone`, by slots that stick: what they hold and rub with, and their equation
 STATIC, SLIDING, WHICH = range(CONE_ROWS - 3, CONE_ROWS)
 
@@ -91,14 +87,6 @@ def most_capacity(scene: Scene) -> float:
 
 
 @jitable
-def least_capacity(scene: Scene, s: int, most: float) -> float:
-    """Return what slot s is taken to hold at least, where `most` is what any holds at most."""
-    mu, size = scene.contacts.friction_par[contact_of(scene, s), MU_STATIC], scene.world.scale
-    push = slipping_mass(scene, s) * size[SCALE_SPEED] ** 2 / size[SCALE_LENGTH]
-    return LEAST_PART * max(most, mu * push)
-
-
-@jitable
 def fill_cones(scene: Scene, t: float, y: F1, most: float) -> tuple[int, int]:
     """Fill limits, slips and load of all slots that stick; return rows and equations in use.
 
@@ -116,9 +104,7 @@ def fill_cones(scene: Scene, t: float, y: F1, most: float) -> tuple[int, int]:
         if sticks(scene, e):
             s = slot[e]
             sweep.cone[WHICH, count // 2] = e
-            sweep.cone[CAPACITY, count // 2] = max(
-                capacity(scene, s), least_capacity(scene, s, most)
-            )
+            sweep.cone[CAPACITY, count // 2] = max(capacity(scene, s), least_limit(scene, s, most))
             fill_slip(scene, t, y, e, begin, sweep.share[count])
             fill_slip(scene, t, y, e + 1, begin, sweep.share[count + 1])
             count += 2
@@ -161,7 +147,7 @@ def sticking_part(scene: Scene) -> float:
         if not sticks(scene, e):
             continue
         along = scene.work.sticking_force[slot[e]]
-        able = max(capacity(scene, slot[e]), least_capacity(scene, slot[e], most))
+        able = max(capacity(scene, slot[e]), least_limit(scene, slot[e], most))
         force = math.hypot(along[0], along[1])
         if able > 0.0:
             part = max(part, force / able)
