@@ -204,11 +204,14 @@ def is_thrown(m: Method, ahead: float) -> bool:
     """Return whether steps at the bound of stability have thrown what rests, soon after the begin.
 
     What flies about then is not the model's motion, and bounces for long; from the begin on the
-    implicit method does not throw it. A step that was cut at a switch is short for that.
+    implicit method does not throw it. A step that was cut at a switch is short for that, and one at
+    the bound that is shorter than the run's mean is of an impact, which leaves by itself.
     """
     began = m.memory[COSTLY] == math.inf and m.counts[STEPS] <= BEGIN_STEPS
     thrown = m.memory[WAS_CUT] == 0.0 and m.memory[LAST_STEP] < THROWS * m.memory[STIFF_STEP]
-    return began and thrown and m.memory[STIFF_STEPS] >= STEADY and ahead > WORTH_THROWN
+    usual = (m.memory[TIME] - m.memory[BEGUN]) / m.memory[EXPLICIT_STEPS]
+    rests = m.memory[STIFF_STEPS] >= STEADY and m.memory[STIFF_STEP] >= usual
+    return began and thrown and rests and ahead > WORTH_THROWN
 
 
 @jitable
