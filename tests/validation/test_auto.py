@@ -99,6 +99,12 @@ def test_an_impact_or_a_short_stiff_run_changes_nothing(name):
     assert auto.stats["method_changes"] == auto.stats["jacobians"] == 0
 
 
+def test_what_leaves_an_impact_is_not_thrown():
+    """Its last step is short, but so were those at the bound: 1.5 times the better."""
+    auto = mbsim.simulate(mbsim.read_model(MODELS / "sdnd121.xml"), tol=1e-3)
+    assert auto.stats["method_changes"] == 0
+
+
 @pytest.mark.parametrize("name", ["sliding_block", "pendulum_wheel", "contensou_disc", "cam"])
 def test_a_short_run_changes_over_where_radau5_takes_far_less(name):
     """Fewer than 2000 steps were ahead: they took 1.4 to 4.7 times RADAU5's work.
