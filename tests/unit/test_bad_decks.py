@@ -276,9 +276,9 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
     ),
     # documented, not built
     "gear": (
-        added('<Constraint_PTCV id="1" i_marker_id="10" j_marker_id="20"/>'),
+        added('<Constraint_CVCV id="1"/>'),
         END_OF_MODEL,
-        ("Constraint_PTCV[1]", "not built yet"),
+        ("Constraint_CVCV[1]", "not built yet"),
     ),
     "spring": (added('<Force_SpringDamper id="1"/>'), END_OF_MODEL, ("Force_SpringDamper[1]",)),
     "sensor": (
