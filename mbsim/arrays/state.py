@@ -49,6 +49,7 @@ class Broadphase(NamedTuple):
     room: (
         F1  # (ng,) how far any point may still move before that; inf for who is in no large contact
     )
+    own: F1  # (ng,) what a fast one may move by itself, where that is more than half of `size`
     box: tags.Scratch[F2]  # (ng, 6) lower and upper corner when pairs are listed
     cell: tags.Scratch[I1]  # (ng,) of the grid
     order: tags.Scratch[I1]  # (ng,) members cell by cell

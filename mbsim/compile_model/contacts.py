@@ -277,6 +277,7 @@ def broadphase_table(
         reference=np.zeros((ng if n else 0, 7)),
         lever=np.zeros(ng if n else 0),
         room=np.full(ng, math.inf),
+        own=np.zeros(ng),
         box=np.zeros((ng if n else 0, 6)),
         cell=np.zeros(ng if n else 0, dtype=np.int64),
         order=np.zeros(ng if n else 0, dtype=np.int64),

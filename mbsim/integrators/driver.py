@@ -381,6 +381,8 @@ def go_on(  # noqa: C901
         error = m.memory[LAST_ERROR]
         if code != 0:
             ends = gives_up(m, code, t, h, floor)
+            if code == Code.TOO_FAR and h <= floor:
+                ends = True
             if ends and code != Code.NOT_FINITE:
                 m.counts[CODE] = code
                 return FAILED

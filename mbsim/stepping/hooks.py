@@ -36,6 +36,9 @@ from mbsim.stepping.rows import (
 from mbsim.stepping.sleep import let_sleep, wake_all
 from mbsim.stepping.step import take_step, want_room
 
+#: How often a step of the deck's length is taken anew, each time with near pairs farther off.
+MOST_TRIES = 4
+
 
 @jitable
 def push(scene: Scene, S: Stepping, h: float, y: F1) -> int:
@@ -96,7 +99,11 @@ def step(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     if committed:
         list_awake(scene, S, y)
     if S.plan.number[FIXED] == 1.0:
-        code = take_fixed_step(scene, S, t, length, y, new)
+        code, tries = take_fixed_step(scene, S, t, length, y, new), 0
+        while code == Code.TOO_FAR and tries < MOST_TRIES:
+            # no shorter step will be tried: what impulses threw is looked for farther off
+            want_room(scene)
+            code, tries = take_fixed_step(scene, S, t, length, y, new), tries + 1
     else:
         code = take_step(scene, S, t, length, y, new, committed)
     code = failure_or(scene, code)

@@ -37,6 +37,8 @@ from mbsim.stepping.awake import list_near_pairs, put_pairs_aside
 
 #: Width of cells over that of boxes, when they are made.
 WIDER = 2.0
+#: Near pairs are looked for so many times farther than a step can come.
+FARTHER = 2.0
 #: Odd numbers that spread the places of cells.
 SPREAD_X, SPREAD_Y, SPREAD_Z = 73856093, 19349663, 83492791
 
@@ -275,10 +277,20 @@ def list_anew(scene: Scene, S: Stepping, y: F1) -> None:
         list_near_pairs(scene, S)
 
 
+@jitable
+def let_slow_down(scene: Scene, S: Stepping) -> None:
+    """Forget how fast members were before the last step."""
+    own, reach = scene.broadphase.own, S.motion.reach
+    for k in range(graphics_awake(scene)):
+        g = graphic_awake(scene, k)
+        own[g] = min(own[g], FARTHER * reach[g])
+
+
 def list_near(context: int, y: Pointer) -> int:
     """The lists of near pairs where shapes have moved far enough."""
     scene = view(context, Scene)
     S, at = view(scene.world.hooks[Hook.STEPPING], Stepping), vector_at(y, scene.rows.y.shape[1])
     if is_used_up(scene, at):
+        let_slow_down(scene, S)
         list_anew(scene, S, at)
     return 0

@@ -25,7 +25,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.dynamics.bodies.acceleration import accelerate
 from mbsim.dynamics.bodies.awake import bodies_awake, body_awake, graphic_awake, graphics_awake
-from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics
+from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics, plane_travel
 from mbsim.dynamics.pipeline.evaluate import add_gravity
 from mbsim.stepping.arrays import (
     ALL_BODIES,
@@ -72,15 +72,13 @@ from mbsim.stepping.friction import (
     noise_of,
 )
 from mbsim.stepping.kept import index_kept, recall
-from mbsim.stepping.near_pairs import list_anew
+from mbsim.stepping.near_pairs import FARTHER, list_anew
 from mbsim.stepping.one_point import apply, velocity_of
 from mbsim.stepping.pairs import find_missed, find_points
 from mbsim.stepping.points import fill_point, fill_reach, way_at
 from mbsim.stepping.sleep import wake_loaded
 from mbsim.stepping.solver import project_positions, solve_points
 
-#: How much farther than a step can come near pairs are looked for.
-ROOM = 4.0
 #: How often a step is solved at most, as what stuck slips.
 MOST_YIELDS = 6
 #: Overlaps so many times deeper than what does not count are pushed out at a bounded speed.
@@ -125,10 +123,15 @@ def make_room(scene: Scene, S: Stepping, y: F1, h: float) -> None:
             if math.isinf(reach):
                 # a plane that turns: at the distance of a usual member, see `plane_travel`
                 reach = way_at(scene, S, g, h, broadphase.lever[g])
-            wanted = max(wanted, reach)
+                wanted = max(wanted, reach)
             short = short or reach > broadphase.room[g]
     if short:
-        broadphase.size[0] = max(broadphase.size[0], ROOM * wanted)
+        broadphase.size[0] = max(broadphase.size[0], 2.0 * FARTHER * wanted)
+        for k in range(graphics_awake(scene)):
+            g = graphic_awake(scene, k)
+            if not math.isinf(broadphase.room[g]) and not math.isinf(S.motion.reach[g]):
+                # what a try found out holds until the step is taken
+                broadphase.own[g] = max(FARTHER * S.motion.reach[g], broadphase.own[g])
         place_graphics(scene, y)
         list_anew(scene, S, y)
 
@@ -141,9 +144,11 @@ def want_room(scene: Scene) -> None:
         g = graphic_awake(scene, k)
         if not math.isinf(broadphase.room[g]):
             broadphase.room[g] = 0.0
-            if not math.isinf(scene.work.travel[g]):
-                farthest = max(farthest, scene.work.travel[g])
-    broadphase.size[0] = max(broadphase.size[0], ROOM * farthest)
+            if math.isinf(scene.work.travel[g]):
+                farthest = max(farthest, plane_travel(scene, g))
+            else:
+                broadphase.own[g] = max(FARTHER * scene.work.travel[g], broadphase.own[g])
+    broadphase.size[0] = max(broadphase.size[0], 2.0 * FARTHER * farthest)
 
 
 @jitable

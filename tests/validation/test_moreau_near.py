@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import mbsim
@@ -68,6 +69,30 @@ def test_what_impulses_throw_at_a_plate_stops_there() -> None:
     assert results["bodies/2/position"][-1, 0] == pytest.approx(0.949, abs=1e-6)
     assert results["bodies/3/position"][-1, 0] == pytest.approx(0.799, abs=1e-6)
     assert abs(results["bodies/3/velocity"][-1, 0]) < 1e-9
+
+
+def test_a_fast_ball_among_many_is_looked_for_far_off() -> None:
+    """It goes 5 radii in a step: near pairs of all others need not be so far apart for that.
+
+    With a skin for all of what it needs there was no place for so many pairs.
+    """
+    places = 0.205 * np.array(list(np.ndindex(6, 6, 10)), dtype=float)
+    speeds = np.zeros_like(places)
+    speeds[180] = 100.0, 60.0, 30.0
+    ids = [100 * (2 + k) for k in range(len(places))]
+    balls = [
+        text.sphere(2 + k, 1.0, 0.1, places[k].tolist(), speeds[k].tolist())
+        for k in range(len(places))
+    ]
+    parts = [*balls, text.contact(301, ids, ids, **decks.rubbed(0.0, 0.5))]
+    whole = [text.GROUND, *parts, decks.FIXED.format(h=0.005)]
+    results = mbsim.simulate(text.deck("near", whole, 0.01, 0.005), integrator="MOREAU")
+    ends = np.array([results[f"bodies/{2 + k}/position"][-1] for k in range(len(places))])
+    v = np.array([results[f"bodies/{2 + k}/velocity"][-1] for k in range(len(places))])
+    assert v.sum(axis=0) == pytest.approx(speeds[180], rel=1e-9)
+    assert (v**2).sum() < (speeds**2).sum()
+    apart = np.linalg.norm(ends[:, None] - ends[None], axis=2) + np.eye(len(ends))
+    assert apart.min() > 0.2 - 1e-4
 
 
 def test_a_cylinder_stands_on_a_box(tmp_path: Path) -> None:

@@ -45,11 +45,19 @@ from mbsim.dynamics.contact.memory import put_aside
 GIANT = 4.0
 #: The skin is halved at most so often to make all near pairs fit.
 MOST_HALVINGS = 20
+#: Each time what a fast member may go by itself becomes this part of it.
+LESS = 0.8
+
+
+@jitable
+def half_skin(scene: Scene, g: int, skin: float) -> float:
+    """Return how far graphic g may go by itself: half of the skin, farther where it is fast."""
+    return max(0.5 * skin, scene.broadphase.own[g])
 
 
 @jitable
 def fill_box(scene: Scene, g: int, skin: float) -> None:
-    """Write the box of graphic g, grown by half the skin."""
+    """Write the box of graphic g, grown by its half of the skin."""
     graphics, frame, box = scene.graphics, scene.work.frames[g], scene.broadphase.box[g]
     for r in range(3):
         half = graphics.radius[g]
@@ -57,7 +65,7 @@ def fill_box(scene: Scene, g: int, skin: float) -> None:
             half = 0.0
             for k in range(3):
                 half += abs(frame[3 + 3 * r + k]) * graphics.half[g, k]
-        half += 0.5 * skin
+        half += half_skin(scene, g, skin)
         box[r] = frame[r] - half
         box[3 + r] = frame[r] + half
 
@@ -77,7 +85,8 @@ def balls_meet(scene: Scene, i: int, j: int, skin: float) -> bool:
     """Return whether the balls around two graphics are nearer than the skin."""
     a, b = scene.work.frames[i], scene.work.frames[j]
     dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
-    together = scene.graphics.radius[i] + scene.graphics.radius[j] + skin
+    together = scene.graphics.radius[i] + scene.graphics.radius[j]
+    together += half_skin(scene, i, skin) + half_skin(scene, j, skin)
     return dx * dx + dy * dy + dz * dz < together * together
 
 
@@ -96,12 +105,13 @@ def near(scene: Scene, i: int, j: int, skin: float) -> bool:
     radius, ground = scene.graphics.radius, len(scene.bodies.mass)
     for plane, other in ((i, j), (j, i)):
         if math.isinf(radius[plane]):
+            room = 0.5 * skin + half_skin(scene, other, skin)
             if scene.graphics.body[plane] != ground:
                 # half of the skin is the other's, half the plane's: more farther away
                 x, p = vector(scene.work.frames[other]), vector(scene.work.frames[plane])
-                farther = (norm(sub(x, p)) + skin) / scene.broadphase.lever[plane]
-                skin *= 0.5 + 0.5 * max(1.0, farther)
-            return not above_plane(scene, plane, other, skin)
+                farther = (norm(sub(x, p)) + room) / scene.broadphase.lever[plane]
+                room += 0.5 * skin * (max(1.0, farther) - 1.0)
+            return not above_plane(scene, plane, other, room)
     return boxes_meet(scene, i, j) and balls_meet(scene, i, j, skin)
 
 
@@ -190,8 +200,9 @@ def against_all(scene: Scene, contact_set: int, i: int, others: int, skin: float
 
 @jitable
 def usual_size(scene: Scene, g: int) -> bool:
-    """Return whether a graphic belongs into the grid."""
-    return scene.graphics.radius[g] <= GIANT * scene.broadphase.size[1]
+    """Return whether a graphic, with how far it may go by itself, belongs into the grid."""
+    broadphase = scene.broadphase
+    return scene.graphics.radius[g] + broadphase.own[g] <= GIANT * broadphase.size[1]
 
 
 @jitable
@@ -412,7 +423,7 @@ def refer(scene: Scene, y: F1, g: int, skin: float) -> None:
     """Keep where a member is that moves when its pairs are listed, and how far it may go."""
     broadphase = scene.broadphase
     frame, reference = scene.work.frames[g], broadphase.reference[g]
-    broadphase.room[g] = 0.5 * skin
+    broadphase.room[g] = half_skin(scene, g, skin)
     for j in range(3):
         reference[j] = frame[j]
     if math.isinf(scene.graphics.radius[g]):
@@ -443,6 +454,8 @@ def list_pairs(scene: Scene, y: F1) -> None:
         # more than there are places for: look less far
         skin *= 0.5
         broadphase.size[0] = skin
+        for g in range(len(broadphase.own)):
+            broadphase.own[g] *= LESS
     order_by_graphic(scene)
     close_ranks(scene)
     for k in range(len(broadphase.member)):
@@ -455,7 +468,6 @@ def list_pairs(scene: Scene, y: F1) -> None:
 def is_used_up(scene: Scene, y: F1) -> bool:
     """Find out how far each member may still move; return whether half of it is gone for one."""
     broadphase, graphics = scene.broadphase, scene.graphics
-    half = 0.5 * broadphase.size[0]
     anew = False
     for row in range(graphics_awake(scene)):
         g = graphic_awake(scene, row)
@@ -475,9 +487,9 @@ def is_used_up(scene: Scene, y: F1) -> bool:
             for k in range(4):
                 d += y[at + k] * reference[3 + k]
             travel += 2.0 * graphics.radius[g] * math.sqrt(max(0.0, 1.0 - d * d))
+        half = half_skin(scene, g, broadphase.size[0])
         broadphase.room[g] = half - travel
-        if travel > 0.5 * half:
-            anew = True
+        anew = anew or travel > 0.5 * half
     return anew
 
 
