@@ -47,7 +47,7 @@ from mbsim.integrators.control import (
     smallest_step,
     starting_step,
 )
-from mbsim.integrators.newton import check_repeats, note_unsolved, stay_before_unsolved
+from mbsim.integrators.newton import check_repeats
 from mbsim.integrators.positions import jumps
 from mbsim.integrators.rows import look_inside, outputs
 from mbsim.integrators.scheme import (
@@ -387,8 +387,6 @@ def go_on(  # noqa: C901
                 m.counts[CODE] = code
                 return FAILED
             unsolved = code == Code.NOT_CONVERGED
-            if unsolved:
-                note_unsolved(m, t + h)
             shrink, reason = (m.memory[RETRY], BY_NEWTON) if unsolved else (0.1, BY_NOT_FINITE)
             reject(p, m, t, max(shrink * h, floor), reason, 0.0)
             m.memory[AFTER_REJECTION] = 1.0
@@ -433,8 +431,6 @@ def go_on(  # noqa: C901
         m.memory[WAS_CUT] = 1.0 if h < whole else 0.0
         word = accept(p, m, steps, t, h, asked)
         arrive_at(m, t, h, h < whole and h == m.memory[HORIZON] - t, t_end)
-        if steps.implicit:
-            stay_before_unsolved(m)
         forgive(m)
         if word < 0:
             m.counts[CODE] = -word

@@ -20,7 +20,6 @@ from mbsim.integrators.scheme import (
     FACTORED_STEP,
     FRESH,
     GROWTH,
-    HALVED,
     HAVE_JACOBIAN,
     JACOBIAN_TIME,
     JACOBIANS,
@@ -31,11 +30,7 @@ from mbsim.integrators.scheme import (
     REJECTED,
     REST,
     RETRY,
-    STEP,
-    TIME,
     TOL,
-    UNSOLVED,
-    UNSOLVED_AT,
     WATCH,
     Method,
     note_failure,
@@ -57,10 +52,6 @@ FELT = 1e-6
 LEAST_REST = 0.05
 #: The step after one whose equations were not solved, where nothing is known of what would be.
 HALF, QUARTER = 0.5, 0.25
-#: Where so many steps one after the other were not solved for, something changes before the end of
-#: the last: friction turns or a contact closes, and none that goes past it in one is. So many are
-#: solved for before it is tried again to go there.
-CHANGES, MOST_HALVED = 2.0, 3.0
 #: Every so many rejections of steps below this part of the problem's own time it is asked whether f
 #: is a function at all.
 SMALL, REJECTIONS = 1e-4, 16
@@ -181,28 +172,6 @@ def with_ease(m: Method, linearised: int, code: int) -> int:
     m.memory[EASE] = max(1.0, m.memory[EASE]) * EASIER if easy else 1.0
     m.memory[GROWTH] = min(m.memory[GROWTH], m.memory[EASE])
     return code
-
-
-@jitable
-def note_unsolved(m: Method, t: float) -> None:
-    """Remember that a step that ended at t was not solved for."""
-    m.memory[UNSOLVED_AT], m.memory[HALVED] = t, 0.0
-    m.memory[UNSOLVED] += 1.0
-
-
-@jitable
-def stay_before_unsolved(m: Method) -> None:
-    """Let the next step end halfway to where others were not solved for, or forget these.
-
-    A step in vain takes 9 to 19 evaluations, one that is solved for 4 to 10. So what changes
-    between the committed point and there is found by bisection, as far as its half is solved for.
-    """
-    ahead = m.memory[UNSOLVED_AT] - m.memory[TIME]
-    if m.memory[UNSOLVED] == 0.0 or ahead <= 0.0:
-        m.memory[UNSOLVED] = m.memory[HALVED] = 0.0
-    elif m.memory[UNSOLVED] >= CHANGES and m.memory[HALVED] < MOST_HALVED:
-        m.memory[HALVED] += 1.0
-        m.memory[STEP] = min(m.memory[STEP], HALF * ahead)
 
 
 @jitable

@@ -120,10 +120,7 @@ EASE = 76
 # of an explicit method: the longest next step within the bound of stability, as its last ones tell,
 # and by how much it may be longer than what was told a step before
 LONGEST, LONGER = range(77, 79)
-# of an implicit method: where the last step ended whose equations were not solved, how many of them
-# since one went past there, and how many of those that were solved since then ended before it
-UNSOLVED_AT, UNSOLVED, HALVED = range(79, 82)
-MEMORY = 82
+MEMORY = 79
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
