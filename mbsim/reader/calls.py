@@ -26,6 +26,10 @@ _NAMED_BY = {
     "joint": ("Constraint_Joint",),
     "array": ("Reference_Array",),
     "matrix": ("Reference_Matrix",),
+    "curve": ("Reference_ParamCurve",),
+    **dict.fromkeys(("joint1", "joint2", "joint3"), ("Constraint_Joint",)),
+    "pinput": ("Control_PlantInput",),
+    "poutput": ("Control_PlantOutput",),
     "evaluate": ("Sensor_Evaluate",),
 }
 _AXES = "xyz"

@@ -114,7 +114,7 @@ PARAM_LINEAR = Statement(
     {
         "pinput_id": Spec(ID, "Control_PlantInput whose variables are the inputs u", "", "none"),
         "poutput_id": Spec(ID, "Control_PlantOutput whose variables are the outputs", "", "none"),
-        "pstate_id": Spec(ID, refused="other states than positions and turns are not built"),
+        "pstate_id": Spec(TEXT, refused="other states than positions and turns are not built"),
         "eigen_analysis": Spec(FLAG, "FALSE: matrices only are told", "", "TRUE"),
         "disable_damping": Spec(
             FLAG, refused="is not built; take the damping out of the forces", harmless="false"

@@ -397,6 +397,7 @@ PUSHES = {
     ("JOINT", 6): (32, 22),
     ("JPRIM", 7): (22, 31),
     ("MOTION", 8): (31, 22),
+    ("PTCV", 9): (22, 32),
 }
 ALONE, FLOATING = {("SFORCE", 3)}, {("VECTORFORCE", 5)}
 FORCES = {
@@ -411,6 +412,10 @@ FORCES = {
     "joints": [el.Joint(6, "SPHERICAL", "", 32, 22)],
     "primitives": [el.Joint(7, "INPLANE", "", 22, 31, is_primitive=True)],
     "motions": [el.Motion(8, "", None, 31, 22, "X", expr=parse("TIME"))],
+    "points_on_curves": [el.PointOnCurve(9, 22, 32, 1)],
+    "curves": [
+        el.ParamCurve(1, ((0.0, 0.0, 0.0), (1.0, 0.2, 0.0), (2.0, 0.0, 1.0), (3.0, 0.0, 0.0)))
+    ],
 }
 NET_NAMES = ("FM", "FX", "FY", "FZ", "TM", "TX", "TY", "TZ")
 FORCE_NAMES = [name for name, function in FUNCTIONS.items() if function.kind is Kind.FORCE]

@@ -219,7 +219,11 @@ def test_results_of_the_wrong_kind_are_said(tmp_path, old, new, said):
             '<Sensor_Event id="8" expr="1" evaluate_id="6"/><Sensor_Evaluate',
             r"Sensor_Event\[8\]: .*Sensor_Event 5 sets it already",
         ),
-        ('dll_name="NULL" usrsub_fnc_name="SENSUB"', 'dll_name="s.so"', r"Sensor_Event.*librar"),
+        (
+            'dll_name="NULL" usrsub_fnc_name="SENSUB"',
+            'dll_name="s.so"',
+            r"Sensor_Event.*no such file",
+        ),
     ],
 )
 def test_a_deck_gives_them_in_one_way(tmp_path, old, new, said):
