@@ -43,9 +43,8 @@ def centripetal(scene: Scene, m: int) -> V3:
 
 
 @jitable
-def offset_term(scene: Scene, y: F1, i: int, j: int, axis: int, G: F1) -> V3:
-    """Return value, rate and second rate of e_J . (P_I - P_J), and fill its gradient."""
-    e = marker_axis(scene, j, axis)
+def along_term(scene: Scene, y: F1, i: int, j: int, e: V3, G: F1) -> V3:
+    """Return value, rate and second rate of e . (P_I - P_J), e fixed to J; fill its gradient."""
     at = marker_point(scene, y, i)
     d = sub(at, marker_point(scene, y, j))
     v = sub(marker_velocity(scene, i), marker_velocity(scene, j))
@@ -57,6 +56,12 @@ def offset_term(scene: Scene, y: F1, i: int, j: int, axis: int, G: F1) -> V3:
     a = sub(centripetal(scene, i), centripetal(scene, j))
     second = dot(e, a) + 2.0 * dot(turned, v) + dot(cross(w, turned), d)
     return dot(e, d), dot(e, v) + dot(turned, d), second
+
+
+@jitable
+def offset_term(scene: Scene, y: F1, i: int, j: int, axis: int, G: F1) -> V3:
+    """Return value, rate and second rate of e_J . (P_I - P_J), and fill its gradient."""
+    return along_term(scene, y, i, j, marker_axis(scene, j, axis), G)
 
 
 @jitable
@@ -163,22 +168,12 @@ def curve_term(scene: Scene, y: F1, i: int, j: int, c: int, which: int, G: F1) -
     for k in range(3):
         axis = marker_axis(scene, j, k)
         e, along = add(e, scale(n[k], axis)), add(along, scale(dx[k], axis))
-    at = marker_point(scene, y, i)
-    arm = sub(at, marker_point(scene, y, j))
+    _, flow, second = along_term(scene, y, i, j, e, G)
     v = sub(marker_velocity(scene, i), marker_velocity(scene, j))
     w = vector(scene.work.w[scene.markers.body[j]])
-    turned = cross(w, e)
-    zero = (0.0, 0.0, 0.0)
-    add_side(scene, y, G[0:6], i, at, e, zero)
-    add_side(scene, y, G[6:12], j, at, scale(-1.0, e), zero)
-    a = sub(centripetal(scene, i), centripetal(scene, j))
-    second = dot(e, a) + 2.0 * dot(turned, v) + dot(cross(w, turned), arm)
+    arm = sub(marker_point(scene, y, i), marker_point(scene, y, j))
     rate = dot(along, sub(v, cross(w, arm))) / dot(dx, dx)
-    return (
-        dot(n, sub(d, x)),
-        dot(e, v) + dot(turned, arm),
-        second - rate * rate * dot(n, ddx),
-    )
+    return dot(n, sub(d, x)), flow, second - rate * rate * dot(n, ddx)
 
 
 @jitable
