@@ -47,11 +47,12 @@ REJECT_ERROR, REJECT_DEPTH, REJECT_NOT_FINITE, REJECT_NEWTON = range(4)
     VECTOR_FORCE,  # components by expressions
     WRENCH,  # of `forces.catalog`
     RESIDUAL,  # Force_Element
+    MULTI_POINT,  # a marker of several: dynamics.forces.multi_point
     SLIDE_FRICTION,  # in joints, as the next three
     TURN_FRICTION,
     SCREW_FRICTION,  # slides and turns at once
     BALL_FRICTION,
-) = range(11)
+) = range(12)
 
 # columns of `Applied.bound`: `forces.catalog.Bounds`, from REST on three numbers
 BOUND_STIFFNESS, BOUND_TURNING, BOUND_DAMPING, BOUND_TURNING_DAMPING, BOUND_FORCE, REST = range(6)
@@ -59,6 +60,9 @@ BOUNDS = 8
 
 # the column of `Applied.par` of a RESIDUAL: its row of `Residuals`
 OF_ELEMENT = 0
+
+# columns of `Applied.par` of a MULTI_POINT: how many markers there are, then the rows of these
+POINTS, OF_POINTS = range(2)
 
 # columns of `State.residual`: from the second on x, f and f'
 AT_TIME = 0

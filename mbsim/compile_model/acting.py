@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mbsim.arrays.model import Applied, Residuals, Sensors, States, Switching
-from mbsim.compile_model.applied import applied_forces
+from mbsim.compile_model.applied import applied_forces, link_points
 from mbsim.compile_model.force_elements import STATEMENT
 from mbsim.compile_model.force_order import check_states, in_order
 from mbsim.compile_model.gravity import Pull, pulls
@@ -129,6 +129,7 @@ def acting(
         model, applied, applied_ids, mechanism.connections, mechanism.elements, programs
     )
     _link_rigid(model, mechanism, applied, applied_ids)
+    link_points(model, applied, applied_ids)
     states = states_table(model, programs)
     table_of_residuals, modes = None, []
     if residuals:

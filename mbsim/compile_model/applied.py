@@ -20,6 +20,7 @@ from mbsim.forces.catalog import (
     Expressed,
     ForceKind,
     Form,
+    MultiPoint,
     OfReactions,
     OfResidual,
     Scalar,
@@ -83,7 +84,7 @@ def applied_forces(
         made.law_par[k, : len(found[k][1])] = found[k][1]
         made.i[k], made.j[k] = _ends(model, markers, element)
         made.axes[k] = made.j[k]
-        if laws and len(constants[k]) > 0 and not isinstance(kind.form, OfReactions):
+        if laws and len(constants[k]) > 0 and isinstance(kind.form, (Scalar, Switched, Wrench)):
             made.formula[k] = _formula(kind, constants[k])
         _FILL[type(kind.form)](to, k, kind.form, element)
     return made, [(kind.name, element.id) for kind, element in given]
@@ -100,7 +101,7 @@ def _constants(kind: ForceKind, element: Any) -> Array:
     """Return what the formula of an element takes, shape (n,)."""
     if isinstance(kind.form, (Scalar, Switched, Wrench)):
         return np.array(kind.form.constants(_values(element)), dtype=np.float64)
-    if isinstance(kind.form, OfReactions):
+    if isinstance(kind.form, (OfReactions, MultiPoint)):
         return np.array(element.constants, dtype=np.float64)
     return _NONE
 
@@ -178,6 +179,21 @@ def _fill_components(to: _Rows, k: int, form: Components, element: Any) -> None:
             to.made.components[k, c] = to.programs.add(expression, element, forces=True)
 
 
+def _fill_multi_point(to: _Rows, k: int, form: MultiPoint, element: Any) -> None:
+    """Fill row k with the force on one of several markers; see `link_points`."""
+    to.made.form[k] = codes.MULTI_POINT
+
+
+def link_points(model: Model, applied: Applied, elements: list[tuple[str, int]]) -> None:
+    """Let the rows of forces of several markers know each other, now that they are in order."""
+    for k in np.flatnonzero(applied.form == codes.MULTI_POINT):
+        kind, id = elements[k]
+        first = id - model.table(kind)[id].place
+        n = int(applied.par[k, codes.POINTS])
+        for b in range(n):
+            applied.par[k, codes.OF_POINTS + b] = elements.index((kind, first + b))
+
+
 def _fill_friction(to: _Rows, k: int, form: OfReactions, element: Any) -> None:
     """Fill row k with what follows from the reactions of a joint."""
     to.made.form[k] = form.forms[to.model.joints[element.joint_id].type]
@@ -203,6 +219,7 @@ _FILL: dict[type[Form], Callable[..., None]] = {
     Expressed: _fill_expressed,
     Wrench: _fill_wrench,
     Components: _fill_components,
+    MultiPoint: _fill_multi_point,
     OfReactions: _fill_friction,
     Switched: _fill_scalar,
     OfResidual: _fill_residual,

@@ -30,8 +30,8 @@ class Function(NamedTuple):
 
     An argument is a ``number`` (any expression), a ``marker``, the id of an element (its
     statement's name), or one of ``jflag``, ``comp``, ``parameter``, ``measure``, ``iord``,
-    ``index``, ``place``, whose values are in `CHOICES`. `call` is how it is written, `about` its
-    value.
+    ``index``, ``place``, ``point``, whose values are in `CHOICES`. `call` is how it is written,
+    `about` its value.
     """
 
     name: str
@@ -51,6 +51,8 @@ CHOICES = {
     "measure": (27, 27),
     "iord": (0, 2),
     "place": (1, 1_000_000),
+    # a marker in decks; once elements are known the id is of the force on one, and this is jflag
+    "point": (0, 2**31 - 1),
 }
 #: Points that a spline must have, by method.
 SPLINE_POINTS = {"AKISPL": 4, "CUBSPL": 4, "LINSPL": 2}
@@ -271,6 +273,13 @@ _element("PTCV", PTCV="of a curve on the point that it holds")
 for _name in FORCES:
     _about = f"of a {FORCES[_name].statement}"
     _element(_name, **dict.fromkeys(FORCES[_name].functions.split(), _about))
+_put(
+    Kind.FORCE,
+    "NFORCE point comp marker",
+    3,
+    "id, i, comp[, k]",
+    NFORCE="of a Force_MultiPoint on marker i, one of its own or J",
+)
 _put(Kind.VARIABLE, "VARIABLE", None, "id", VARVAL="value of a Reference_Variable")
 _put(Kind.VARIABLE, "DIFF", None, "id", DIF1="z' of a Control_Diff")
 _put(Kind.STATE, "DIFF", None, "id", DIF="z of a Control_Diff")

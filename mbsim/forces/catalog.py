@@ -32,8 +32,10 @@ what they do to bodies counts as lost, with the sign turned.
 ``bounds(par)`` says what a method without error estimate has to follow; such a method refuses kinds
 that have none.
 
-Two are registered and act elsewhere, because no formula of displacements gives them. Friction in
-joints (`OfReactions`) follows from the reactions that it changes: `dynamics.forces.joint_friction`.
+Three are registered and act elsewhere, because no formula of two markers gives them.
+Force_MultiPoint (`MultiPoint`) has a row for each marker: `dynamics.forces.multi_point`. Friction
+in joints (`OfReactions`) follows from the reactions that it changes:
+`dynamics.forces.joint_friction`.
 Force_Element (`OfResidual`) has unknowns of its own, which a user's residual makes 0:
 `dynamics.forces.force_element`. Rigid dry friction has a formula where it slides; what holds it is
 an equation, in `dynamics.stiction.rigid_friction`.
@@ -206,6 +208,11 @@ class Components(Form):
 
 
 @dataclass(frozen=True)
+class MultiPoint(Form):
+    """Force and torque on each of several markers by how all of them stand and move."""
+
+
+@dataclass(frozen=True)
 class OfReactions(Form):
     """What follows from a joint's reactions: an entry of `Applied.form` by the joint's type."""
 
@@ -240,7 +247,7 @@ class OfResidual(Form):
     """Forces whose unknowns make a user's residual 0."""
 
 
-_ORDER = (Scalar, Expressed, Wrench, Components, OfReactions, Switched, OfResidual)
+_ORDER = (Scalar, Expressed, Wrench, Components, MultiPoint, OfReactions, Switched, OfResidual)
 
 
 class ForceKind(NamedTuple):

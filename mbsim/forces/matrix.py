@@ -1,4 +1,4 @@
-"""Matrices of 6 x 6 among the constants of a force, by rows."""
+"""Matrices of six rows among the constants of a force, by rows."""
 
 from __future__ import annotations
 
@@ -10,14 +10,19 @@ from mbsim.core.rotation import add, scale
 
 
 @jitable
-def times(par: Sequence[float], first: int, a: V3, b: V3) -> tuple[V3, V3]:
-    """Return the two halves of the 6 x 6 matrix from `first` on times (a, b)."""
+def column(par: Sequence[float], at: int, width: int) -> tuple[V3, V3]:
+    """Return the two halves of a column of six numbers from `at` on, each `width` further."""
+    low = at + 3 * width
+    upper = par[at], par[at + width], par[at + 2 * width]
+    return upper, (par[low], par[low + width], par[low + 2 * width])
+
+
+@jitable
+def times(par: Sequence[float], first: int, a: V3, b: V3, width: int = 6) -> tuple[V3, V3]:
+    """Return the two halves of six columns from `first` on times (a, b); rows are `width` long."""
     out = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for k in range(3):
-        at = first + k
-        by_a = (par[at], par[at + 6], par[at + 12]), (par[at + 18], par[at + 24], par[at + 30])
-        at += 3
-        by_b = (par[at], par[at + 6], par[at + 12]), (par[at + 18], par[at + 24], par[at + 30])
+        by_a, by_b = column(par, first + k, width), column(par, first + k + 3, width)
         upper = add(scale(a[k], by_a[0]), scale(b[k], by_b[0]))
         lower = add(scale(a[k], by_a[1]), scale(b[k], by_b[1]))
         out = add(out[0], upper), add(out[1], lower)

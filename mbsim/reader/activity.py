@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from mbsim.errors import Fault
-from mbsim.forces.catalog import FORCES
+from mbsim.forces.catalog import FORCES, MultiPoint
 from mbsim.reader.draft import Draft
 from mbsim.reader.keywords import spellings
 from mbsim.reader.kinds import ID, keyword
@@ -28,6 +28,7 @@ _TABLES: Mapping[str, tuple[str, ...]] = {
     "JOINT": ("joints",),
     "JPRIM": ("primitives",),
     "MOTION": ("motions",),
+    "NFORCE": ("NFORCE",),
     "SENSOR": ("sensors",),
     "SFORCE": ("SFORCE",),
     "SPDP": ("SPRINGDAMPER",),
@@ -49,7 +50,7 @@ _STATEMENTS = {
 TYPES = spellings(**dict.fromkeys(_TABLES, ""))
 TYPES_NOT_BUILT = spellings(
     **dict.fromkeys(
-        "CVCV CVSF DIFF GEAR GSE LSE MATE MFORCE NFORCE PFORCE PTDCV PTDSF PTDSFF PTSF SFSF "
+        "CVCV CVSF DIFF GEAR GSE LSE MATE MFORCE PFORCE PTDCV PTDSF PTDSFF PTSF SFSF "
         "TFSISO UCON YFORCE".split(),
         "",
     )
@@ -68,6 +69,8 @@ def statement_of(table: str, element: Any = None) -> str:
 def _elements(draft: Draft, table: str) -> Mapping[int, Any]:
     """Return the elements of a table, by id."""
     kind = FORCES[table] if table in FORCES else None
+    if kind is not None and isinstance(kind.form, MultiPoint):
+        return draft.multi_points
     if kind is not None and not kind.table:
         return draft.marker_forces.get(table, {})
     found: Mapping[int, Any] = getattr(draft, kind.table if kind is not None else table)

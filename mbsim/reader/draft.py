@@ -22,6 +22,19 @@ class GearDraft:
     source: el.Source = field(default_factory=el.Source)
 
 
+@dataclass(frozen=True)
+class MultiPointDraft:
+    """A Force_MultiPoint as it is read: markers and ids of matrices, None where there is none."""
+
+    id: int
+    marker_ids: tuple[int, ...]
+    ref_marker_id: int
+    matrices: dict[str, int | None]  # by attribute
+    cratio: float | None = None
+    label: str = ""
+    source: el.Source = field(default_factory=el.Source)
+
+
 @dataclass
 class Draft:
     """Elements by id and the findings; `broken` holds (statement, id) with a fault of their own.
@@ -46,6 +59,7 @@ class Draft:
     points_on_curves: dict[int, el.PointOnCurve] = field(default_factory=dict)
     scalar_forces: dict[int, el.ScalarForce] = field(default_factory=dict)
     marker_forces: dict[str, dict[int, el.MarkerForce]] = field(default_factory=dict)
+    multi_points: dict[int, MultiPointDraft] = field(default_factory=dict)
     vector_forces: dict[int, el.VectorForce] = field(default_factory=dict)
     body_forces: dict[int, el.BodyForce] = field(default_factory=dict)
     joint_frictions: dict[int, el.JointFriction] = field(default_factory=dict)

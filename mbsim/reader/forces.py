@@ -6,7 +6,15 @@ from collections.abc import Callable, Mapping
 from typing import Any, get_args, get_type_hints
 
 from mbsim.expressions import Expression
-from mbsim.forces.catalog import FORCES, USERS, ForceKind, OfResidual, Parameter, Reading
+from mbsim.forces.catalog import (
+    FORCES,
+    USERS,
+    ForceKind,
+    MultiPoint,
+    OfResidual,
+    Parameter,
+    Reading,
+)
 from mbsim.model import elements as el
 from mbsim.reader.contact import CFF_ALL, CFF_USES, FORCE_CONTACT, check_coulomb
 from mbsim.reader.keywords import CFF_OF_JOINTS, CNF_OF_LIMITS, spellings
@@ -191,5 +199,6 @@ def _statement(kind: ForceKind) -> Statement:
 
 
 def force_statements() -> list[Statement]:
-    """Return the XML statements of all kinds."""
-    return [_statement(FORCES[name]) for name in FORCES]
+    """Return the XML statements of all kinds but those that are put together by `multi_point`."""
+    kinds = [FORCES[name] for name in FORCES]
+    return [_statement(kind) for kind in kinds if not isinstance(kind.form, MultiPoint)]

@@ -9,10 +9,9 @@ slopes, linearisation, statics and results of such states are those of Control_D
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from mbsim.errors import Fault
 from mbsim.expressions.tree import Call, Expression, Node, Number
 from mbsim.model import elements as el
 from mbsim.model.source import Source
+from mbsim.reader.rewriting import Rewriting
 
 if TYPE_CHECKING:
     from mbsim.reader.draft import Draft
@@ -142,11 +142,7 @@ def expand(draft: Draft) -> list[Fault]:
         if array.type == "U":
             meanings.setdefault(array.id, [_call("VARVAL", id) for id in array.variable_ids])
     put_in = _PutIn(meanings, draft)
-    for table in dataclasses.fields(draft):
-        old = getattr(draft, table.name)
-        if isinstance(old, dict):
-            setattr(draft, table.name, put_in(old))
-    draft.simulations = put_in(draft.simulations)
+    put_in.rewrite()
     return faults + put_in.faults
 
 
@@ -265,57 +261,21 @@ def _sum(
     return terms[0] if terms else Number(0.0)
 
 
-class _PutIn:
+class _PutIn(Rewriting):
     """Replaces ARYVAL of control arrays in all expressions that something holds."""
 
     def __init__(self, meanings: dict[int, list[Node]], draft: Draft) -> None:
+        super().__init__(draft)
         self.meanings = meanings
         self.types = {id: array.type for id, array in draft.control.arrays.items()}
         self.broken = {id for name, id in draft.broken if name == "Reference_Array"}
-        self.faults: list[Fault] = []
-        self.source = Source()
 
-    def __call__(self, value: Any) -> Any:
-        """Return a value with its expressions rewritten; the same one where none is."""
-        if isinstance(value, Expression):
-            root = self.node(value.root)
-            return value if root is value.root else Expression(value.text, root)
-        if isinstance(value, dict):
-            return self._kept(
-                value, list(value.values()), lambda new: dict(zip(value, new, strict=True))
-            )
-        if isinstance(value, (list, tuple)) and type(value) in (list, tuple):
-            return self._kept(value, list(value), type(value))
-        if dataclasses.is_dataclass(value) and not isinstance(value, type):
-            self.source = getattr(value, "source", self.source)
-            names = [each.name for each in dataclasses.fields(value) if each.init]
-            old = [getattr(value, name) for name in names]
-            made: Any = value
-            return self._kept(
-                value,
-                old,
-                lambda new: dataclasses.replace(made, **dict(zip(names, new, strict=True))),
-            )
-        return value
-
-    def _kept(self, value: Any, old: list[Any], make: Callable[[list[Any]], Any]) -> Any:
-        """Return what `make` makes of rewritten parts, the value itself where all are the same."""
-        new = [self(part) for part in old]
-        return value if all(a is b for a, b in zip(old, new, strict=True)) else make(new)
-
-    def node(self, node: Node) -> Node:
-        """Return a tree with ARYVAL of control arrays replaced."""
-        if not isinstance(node, Call):
-            return node
+    def call(self, node: Call) -> Node | None:
+        """Return what an element of a control array means."""
         ids = [int(arg.value) for arg in node.args if isinstance(arg, Number)]
-        if node.name == "ARYVAL" and len(ids) == 2 and ids[0] in self.types:
-            return self._element(node, *ids)
-        args = tuple(self.node(arg) for arg in node.args)
-        same = all(a is b for a, b in zip(args, node.args, strict=True))
-        return node if same else Call(node.name, args, node.column)
-
-    def _element(self, node: Call, id: int, place: int) -> Node:
-        """Return what element `place` of an array means, with a fault where there is none."""
+        if node.name != "ARYVAL" or len(ids) != 2 or ids[0] not in self.types:
+            return None
+        id, place = ids
         values = self.meanings.get(id)
         if values is not None and 1 <= place <= len(values):
             return values[place - 1]
@@ -325,7 +285,5 @@ class _PutIn:
                 if values is not None
                 else (f"is of type {self.types[id]} and belongs to no control statement")
             )
-            said = f"ARYVAL({id}, {place}): array {id} {what}"
-            source = self.source
-            self.faults.append(Fault(source.file, source.line, f"Reference_Array[{id}]", said))
+            self.fault("Reference_Array", id, f"ARYVAL({id}, {place}): array {id} {what}")
         return Number(0.0)

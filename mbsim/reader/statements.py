@@ -30,6 +30,7 @@ from mbsim.reader.linear_analysis import (
     PARAM_LINEAR,
 )
 from mbsim.reader.matrix import REFERENCE_MATRIX
+from mbsim.reader.multi_point import FORCE_MULTI_POINT
 from mbsim.reader.output_statements import OUTPUT_STATEMENTS
 from mbsim.reader.param_simulation import PARAM_SIMULATION
 from mbsim.reader.parse import Node
@@ -60,6 +61,7 @@ STATEMENTS = (
     MOTION_JOINT,
     MOTION_MARKER,
     *force_statements(),
+    FORCE_MULTI_POINT,
     REFERENCE_VARIABLE,
     CONTROL_DIFF,
     CONTROL_SISO,

@@ -24,6 +24,7 @@ from mbsim.reader.gears import complete_gears
 from mbsim.reader.keywords import fold
 from mbsim.reader.linear_analysis import check_plants
 from mbsim.reader.linear_systems import expand
+from mbsim.reader.multi_point import expand as expand_multi_points
 from mbsim.reader.overrides import apply_overrides, as_texts
 from mbsim.reader.parse import MAX_BYTES, Node, parse
 from mbsim.reader.points import hold_points
@@ -102,6 +103,7 @@ def _read(path: Given, texts: tuple[str, ...]) -> el.Model:
     deck = Path(name)
     draft, said_so = _read_draft(name, data, texts)
     draft.faults.extend(map(said_so, expand(draft)))
+    draft.faults.extend(map(said_so, expand_multi_points(draft)))
     draft.faults.extend(map(said_so, complete_sensors(draft)))
     draft.faults.extend(map(said_so, complete_curves(draft)))
     draft.faults.extend(map(said_so, check_plants(draft)))

@@ -28,7 +28,7 @@ _MEASURES = {
     "torque": ("TM", "TX", "TY", "TZ"),
 }
 #: Those whose third argument says whether it is a force (1..4) or a torque (5..8).
-_FORCES_OF_ELEMENTS = {name for name, function in FUNCTIONS.items() if "jflag" in function.args}
+_FORCES_OF_ELEMENTS = {n for n, f in FUNCTIONS.items() if {"jflag", "point"} & {*f.args}}
 #: F1 and F5 are magnitudes of the three columns behind them.
 MAGNITUDES = (1, 5)
 

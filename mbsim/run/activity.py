@@ -15,6 +15,7 @@ from mbsim.arrays.codes import (
     COMPONENT,
     JOINT_FRICTION,
     MORE,
+    MULTI_POINT,
     ON,
     PROGRAM,
     ROW_OF,
@@ -86,7 +87,7 @@ class Activity:
             applied.by_reactions[u, PROGRAM] = nothing
             if applied.by_reactions[u, COMPONENT] == JOINT_FRICTION:
                 applied.by_reactions[u, COMPONENT] = SCALAR
-        if applied.form[f] in (VECTOR_FORCE, WRENCH) or applied.connection[f] >= 0:
+        if applied.form[f] in (VECTOR_FORCE, WRENCH, MULTI_POINT) or applied.connection[f] >= 0:
             # friction in a joint is settled with the reactions, or else not at all
             applied.form[f], applied.components[f] = VECTOR_FORCE, -1
             applied.connection[f], applied.law[f] = -1, 0

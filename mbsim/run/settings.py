@@ -10,7 +10,15 @@ from typing import Any
 import numpy as np
 
 from mbsim.errors import ModelError
-from mbsim.forces.catalog import FORCES, Components, Expressed, Form, OfResidual, Switched
+from mbsim.forces.catalog import (
+    FORCES,
+    Components,
+    Expressed,
+    Form,
+    MultiPoint,
+    OfResidual,
+    Switched,
+)
 from mbsim.integrators.catalog import (
     AUTO,
     EXPLICIT,
@@ -224,6 +232,7 @@ def _refuse_verlet(model: Model) -> None:
         Expressed: unknown.format("an expression"),
         Components: unknown.format("an expression"),
         OfResidual: unknown.format("a user's residual"),
+        MultiPoint: unknown.format("a matrix of many markers"),
     }
     kinds = [FORCES[name] for name in FORCES]
     forces = [

@@ -389,6 +389,12 @@ MARKER_FORCES = [
     for k, kind in enumerate(KINDS[name] for name in KINDS)
     if kind.functions and not kind.table
 ]
+# of one marker, its own row being the only one
+MARKER_FORCES.append(
+    el.MarkerForce(
+        39, "NFORCE", "", 21, 31, (("place", 0), ("constants", (1.0, *np.ones(1 + 12 + 108))))
+    )
+)
 PUSHES = {
     **{(force.kind, force.id): (21, 31) for force in MARKER_FORCES},
     ("SFORCE", 1): (21, 31),

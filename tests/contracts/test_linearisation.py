@@ -445,6 +445,28 @@ def test_a_beam(hold, move, tmp_path):
     check(of(two("FREE", hold, extra=MARKERS + END + BEAM), tmp_path), 1e-5, move=move)
 
 
+@pytest.mark.parametrize("move", [1e-4, 0.1])
+@pytest.mark.parametrize("ends", [(512, 513, 511), (512, 500, 511), (511, 513, 500)])
+def test_a_force_of_several_markers(ends, move, tmp_path):
+    first, second, j = ends
+    A, B = np.random.default_rng(3).normal(size=(2, 12, 12))
+    K, C = 40.0 * A @ A.T, 0.4 * B @ B.T
+    K[1, 8] += 9.0  # what is not symmetric has slopes too
+    loads, lengths = np.arange(12.0)[:, None], 0.01 * np.arange(6.0)[:, None]
+    text = (
+        f'<Force_MultiPoint id="1" ref_marker_id="{j}" kmtx_id="1" cmtx_id="2" preload_mtx_id="3" '
+        f'length_mtx_id="4" n_i_marker="2">{first} {second}</Force_MultiPoint>'
+    )
+    for id, matrix in enumerate((K, C, loads, lengths), 1):
+        rows, columns = matrix.shape
+        values = " ".join(repr(float(x)) for x in matrix.ravel())
+        text += (
+            f'<Reference_Matrix id="{id}" nrow="{rows}" ncol="{columns}" isroworder="TRUE">'
+            f"{values}</Reference_Matrix>"
+        )
+    check(of(two("FREE", extra=MARKERS + END + text), tmp_path), 1e-5, move=move)
+
+
 LIMIT = 'cnf_type="IMPACT" stiffness="900" exponent="1.5" damping="20" dmax="0.02"/>'
 
 

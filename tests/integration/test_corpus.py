@@ -29,7 +29,9 @@ _SIZES = re.compile(r"linear: (\d+) states (\d+) inputs (\d+) outputs (\d+)")
 _RUN = re.compile(r"run: (.*)")
 _REFUSED = re.compile(r"refused: (\d+): (.*)")
 #: Decks that a command file runs.
-_PARTS = ("adams_activity.adm", "adams_held_state.adm", "adams_linear.adm", "adams_spring.adm")
+_PARTS = tuple(
+    f"adams_{name}.adm" for name in ("activity", "held_state", "linear", "nforce", "spring")
+)
 
 
 def decks(pattern: re.Pattern[str]) -> list[Any]:

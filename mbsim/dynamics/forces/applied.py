@@ -14,7 +14,7 @@ work F x' counts as lost, with the sign turned, for nothing says what part of it
 Where a force acts on I alone x' is I's own. Where the origins coincide a line has no direction and
 its force is 0. Friction in joints needs their reactions and comes later (`forces.joint_friction`),
 and so do forces by expressions of reactions (`forces.reaction_forces`); wrenches and vector forces
-are in `forces.wrenches`.
+are in `forces.wrenches`, those of several markers in `forces.multi_point`.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from mbsim.arrays.codes import (
     EVENT_TIME,
     LINE_FORCE,
     LOST_POWER,
+    MULTI_POINT,
     OF_DAMPERS,
     RESIDUAL,
     SLIDER,
@@ -196,7 +197,7 @@ def add_applied(scene: Scene, t: float, y: F1, dy: F1) -> int:
             for k in range(len(work.applied[f])):
                 work.applied[f, k] = 0.0
             continue
-        if form == VECTOR_FORCE or form == WRENCH or form == RESIDUAL:
+        if form == VECTOR_FORCE or form == WRENCH or form == RESIDUAL or form == MULTI_POINT:
             code = wrench(scene, t, y, f)
         else:
             code = add_scalar(scene, t, y, f)

@@ -13,6 +13,9 @@ from mbsim.arrays.codes import (
     AXIS_FORCE_AT_I,
     AXIS_TORQUE,
     LINE_FORCE,
+    MULTI_POINT,
+    OF_POINTS,
+    POINTS,
     RESIDUAL,
     SCALE_LENGTH,
     SCALE_SPEED,
@@ -54,6 +57,11 @@ def couple_applied(scene: Scene, P: Pattern, T: Tangent) -> bool:
         i, j = sides_of(scene, f)
         if i < nb and j < nb and i != j and not couple(P, i, j):
             return False
+        if scene.applied.form[f] == MULTI_POINT:
+            for k in range(int(scene.applied.par[f, POINTS])):
+                other = sides_of(scene, int(scene.applied.par[f, OF_POINTS + k]))[0]
+                if i < nb and other < nb and i != other and not couple(P, i, other):
+                    return False
         # whose axes a force is along
         along = scene.markers.body[scene.applied.axes[f]]
         for a in (i, j):
@@ -168,6 +176,8 @@ def add_applied_slopes(scene: Scene, T: Tangent, t: float, y: F1) -> int:
         form = scene.applied.form[f]
         if form == VECTOR_FORCE:
             add_vector_slopes(scene, T, t, y, f)
-        elif form != WRENCH and form != RESIDUAL and scene.applied.connection[f] < 0:
+        elif form == WRENCH or form == RESIDUAL or form == MULTI_POINT:
+            continue
+        elif scene.applied.connection[f] < 0:
             add_scalar_slopes(scene, T, t, y, f)
     return 0

@@ -1,5 +1,7 @@
 """How marker forces and friction in joints change with displacements and velocities: more of K, D.
 
+So are forces of several markers, each of which changes with bodies that it does not act on.
+
 Apart from `applied_slopes`, so that only scenes that have them compile them. A marker force's own
 slopes are by what I does as seen from J, along J's axes (`forces.catalog`); that these axes turn is
 added here. The reactions that press friction are taken as they are.
@@ -9,7 +11,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mbsim.arrays.codes import BALL_FRICTION, SCALE_SPEED, SCREW_FRICTION, SLIDE_FRICTION, WRENCH
+from mbsim.arrays.codes import (
+    BALL_FRICTION,
+    MULTI_POINT,
+    SCALE_SPEED,
+    SCREW_FRICTION,
+    SLIDE_FRICTION,
+    WRENCH,
+)
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1, F2, F3, V3
@@ -20,33 +29,48 @@ from mbsim.dynamics.bodies.markers import marker_arm, marker_axis, marker_point,
 from mbsim.dynamics.contact.forces import velocity_at
 from mbsim.dynamics.expressions.measures import unit
 from mbsim.dynamics.forces.joint_friction import FORCE, RADIUS, SPEED, ask_law
+from mbsim.dynamics.forces.multi_point import (
+    own_turning,
+    place_of,
+    points_of,
+    row_of_point,
+    stiffness_column,
+    strip_at,
+)
 from mbsim.dynamics.forces.wrenches import fill_motion
 from mbsim.dynamics.linearization.stiffness import (
     PART,
     PART_OF_SPEED,
+    PUSH,
     add_axis_rate,
     add_geometry,
     add_one_sided,
+    add_product,
     add_rate_by_pose,
     add_two_sided,
     lever,
     sides_of,
 )
+from mbsim.forces.matrix import column
 
 if TYPE_CHECKING:
     from mbsim.compile_model.tangent import Pattern, Tangent
 
+# row of `basis` behind those of the units of the marker that is pushed
+_MOVED = 6
+
 
 @jitable
-def add_marker_rate(scene: Scene, T: Tangent, y: F1, f: int, e: V3, factor: float, u: F2) -> None:
-    """Add how the rate along J's axis e, at I's origin p, changes with poses.
+def add_marker_rate(
+    scene: Scene, T: Tangent, y: F1, f: int, g: int, e: V3, factor: float, u: F2
+) -> None:
+    """Add to force f how the rate of g along J's axis e, at I's origin p, changes with poses.
 
     theta_I . (arm x (e x w_I)) + theta_J . (e x v) - h . (dp - dx_J), h = e x w_J, x_J J's cg.
     """
     P, L, nb = T.pattern, T.linear, len(scene.bodies.mass)
-    i, work = scene.applied.i[f], scene.work
-    both = sides_of(scene, f)
-    bi, bj = both
+    i, work = scene.applied.i[g], scene.work
+    both, (bi, bj) = sides_of(scene, f), sides_of(scene, g)
     p, none = marker_point(scene, y, i), (0.0, 0.0, 0.0)
     v = sub(velocity_at(scene, y, bi, p), velocity_at(scene, y, bj, p))
     h = cross(e, vector(work.w[bj]))
@@ -62,15 +86,15 @@ def add_marker_rate(scene: Scene, T: Tangent, y: F1, f: int, e: V3, factor: floa
 
 
 @jitable
-def add_marker_spin(scene: Scene, T: Tangent, f: int, e: V3, factor: float, u: F2) -> None:
-    """Add how the spin about J's axis e changes as that turns: theta_J . (e x w)."""
-    bi, bj = sides_of(scene, f)
+def add_marker_spin(scene: Scene, T: Tangent, f: int, g: int, e: V3, factor: float, u: F2) -> None:
+    """Add to force f how the spin of g about J's axis e turns with it: theta_J . (e x w)."""
+    bi, bj = sides_of(scene, g)
     turned = cross(e, sub(vector(scene.work.w[bi]), vector(scene.work.w[bj])))
     for k in range(3):
         T.linear.rise[k] = turned[k]
         T.linear.rise[3 + k] = 0.0
     if bj < len(scene.bodies.mass):
-        both = (bi, bj)
+        both = sides_of(scene, f)
         add_one_sided(T.pattern, T.linear, len(scene.bodies.mass), both, bj, factor, u)
 
 
@@ -117,9 +141,9 @@ def add_marker_force_slopes(scene: Scene, T: Tangent, y: F1, f: int) -> None:
             if D[r, k] == 0.0:
                 continue
             if k < 3:
-                add_marker_rate(scene, T, y, f, e, -D[r, k], L.basis[:, r])
+                add_marker_rate(scene, T, y, f, f, e, -D[r, k], L.basis[:, r])
             else:
-                add_marker_spin(scene, T, f, e, -D[r, k], L.basis[:, r])
+                add_marker_spin(scene, T, f, f, e, -D[r, k], L.basis[:, r])
         if k >= 3:
             add_column(P, L.K, nb, both, K, k, L.basis)
     add_geometry(scene, T, y, f, j, 0)
@@ -196,3 +220,59 @@ def add_joint_frictions_slopes(scene: Scene, T: Tangent, t: float, y: F1) -> Non
     for f in range(len(scene.applied.form)):
         if scene.applied.connection[f] >= 0 and scene.applied.law[f] != 0:
             add_joint_friction_slopes(scene, T, t, y, f)
+
+
+@jitable
+def add_pushed(
+    P: Pattern, blocks: F3, pushed: tuple[int, int], moved: tuple[int, int], factor: float,
+    u: F2, v: F2,
+) -> None:  # fmt: skip
+    """Add factor u v' of a force between two bodies by the displacement between two others."""
+    nb = P.block.shape[0]
+    for of in range(2):
+        for by in range(2):
+            a, b = pushed[of], moved[by]
+            if a < nb and b < nb:
+                size = factor if of == by else -factor
+                add_product(blocks[P.block[a, b]], size, u[of], v[by])
+
+
+@jitable
+def add_point_slopes(scene: Scene, T: Tangent, y: F1, f: int, b: int) -> None:
+    """Add how the force on the marker of row f changes by marker b; its units are filled."""
+    P, L, j, n = T.pattern, T.linear, scene.applied.j[f], points_of(scene, f)
+    g, own = row_of_point(scene, f, b), place_of(scene, f) == b
+    pushed, moved, none = sides_of(scene, f), sides_of(scene, g), (0.0, 0.0, 0.0)
+    p, damping = marker_point(scene, y, scene.applied.i[g]), strip_at(n, 2) + 6 * b
+    for k in range(6):
+        e = marker_axis(scene, j, k % 3)
+        stiff = stiffness_column(scene, y, f, b, k)
+        turned = own_turning(scene, y, f, k - 3, PUSH) if own and k >= 3 else none
+        slow = column(scene.applied.par[f], damping + k, 6 * n)
+        for side in range(2):
+            v = L.basis[side, _MOVED]
+            lever(scene, L, y, moved[side], p, e if k < 3 else none, none if k < 3 else e, v)
+        for r in range(6):
+            u, v = L.basis[:, r], L.basis[:, _MOVED]
+            part = stiff[0][r] if r < 3 else stiff[1][r - 3] + turned[r - 3]
+            if part != 0.0:
+                add_pushed(P, L.K, pushed, moved, -part, u, v)
+            part = slow[0][r] if r < 3 else slow[1][r - 3]
+            if part != 0.0:
+                add_pushed(P, L.D, pushed, moved, -part, u, v)
+                if k < 3:
+                    add_marker_rate(scene, T, y, f, g, e, -part, u)
+                else:
+                    add_marker_spin(scene, T, f, g, e, -part, u)
+
+
+@jitable
+def add_multi_point_slopes(scene: Scene, T: Tangent, y: F1) -> None:
+    """Add all of them."""
+    for f in range(len(scene.applied.form)):
+        if scene.applied.form[f] != MULTI_POINT:
+            continue
+        fill_units(scene, T, y, f)
+        for b in range(points_of(scene, f)):
+            add_point_slopes(scene, T, y, f, b)
+        add_geometry(scene, T, y, f, scene.applied.j[f], 0)

@@ -18,6 +18,7 @@ from mbsim.dynamics.forces.applied import add_applied, serve_kept
 from mbsim.dynamics.forces.force_element import keep_residuals, serve_residual
 from mbsim.dynamics.forces.gravity import add_weight
 from mbsim.dynamics.forces.joint_friction import add_friction
+from mbsim.dynamics.forces.multi_point import add_any_wrench
 from mbsim.dynamics.forces.reaction_forces import add_reaction_forces
 from mbsim.dynamics.forces.wrenches import add_marker_force, add_vector_force, add_wrench
 from mbsim.dynamics.stiction.rigid_contact import serve_sticking
@@ -63,6 +64,12 @@ def act_by_wrench(context: int, t: float, y: Pointer, f: int) -> int:
     """One or the other, where a scene has both."""
     scene = view(context, Scene)
     return add_wrench(scene, t, vector_at(y, scene.rows.y.shape[1]), f)
+
+
+def act_by_any_wrench(context: int, t: float, y: Pointer, f: int) -> int:
+    """Any, where a scene has forces of several markers."""
+    scene = view(context, Scene)
+    return add_any_wrench(scene, t, vector_at(y, scene.rows.y.shape[1]), f)
 
 
 def add_joint_friction(context: int, t: float, y: Pointer, dy: Pointer) -> int:

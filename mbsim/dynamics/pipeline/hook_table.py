@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from mbsim.arrays.codes import RESIDUAL, VECTOR_FORCE, WRENCH
+from mbsim.arrays.codes import MULTI_POINT, RESIDUAL, VECTOR_FORCE, WRENCH
 from mbsim.arrays.hooks import Hook
 from mbsim.arrays.scene import Scene
 from mbsim.compile_model.tangent import Tangent
@@ -136,7 +136,7 @@ def _applied(scene: Scene) -> Callable[..., Any]:
 
 
 def _has_wrenches(scene: Scene, method: Method) -> bool:
-    return bool(np.isin(scene.applied.form, (VECTOR_FORCE, WRENCH, RESIDUAL)).any())
+    return bool(np.isin(scene.applied.form, (VECTOR_FORCE, WRENCH, RESIDUAL, MULTI_POINT)).any())
 
 
 def _wrench(scene: Scene) -> Callable[..., Any]:
@@ -144,6 +144,8 @@ def _wrench(scene: Scene) -> Callable[..., Any]:
     from mbsim.dynamics.pipeline import force_hooks as of
 
     form = scene.applied.form
+    if (form == MULTI_POINT).any():
+        return of.act_by_any_wrench
     vectors = np.isin(form, (VECTOR_FORCE, RESIDUAL)).any()
     if (form == WRENCH).any():
         return of.act_by_wrench if vectors else of.act_by_marker_force
@@ -200,6 +202,8 @@ def _slopes(scene: Scene) -> Callable[..., Any]:
     forms = set(scene.applied.form.tolist())
     from mbsim.dynamics.pipeline import implicit_hooks as of
 
+    if MULTI_POINT in forms:
+        return of.all_slopes if RESIDUAL in forms else of.slopes_with_multi_points
     if RESIDUAL in forms:
         return of.residual_slopes
     has_friction = bool((scene.applied.connection >= 0).any())

@@ -14,6 +14,7 @@ from mbsim.dynamics.linearization.applied_slopes import add_applied_slopes
 from mbsim.dynamics.linearization.connection_slopes import (
     add_joint_frictions_slopes,
     add_marker_forces_slopes,
+    add_multi_point_slopes,
 )
 from mbsim.dynamics.linearization.contact_slopes import (
     add_contacts_slopes,
@@ -113,23 +114,42 @@ def slopes_with_joint_friction(context: int, t: float, y: Pointer) -> int:
     return code
 
 
-def slopes_with_both(context: int, t: float, y: Pointer) -> int:
-    """The same, of both."""
-    scene, T, a = placed(context, y)
-    code = add_applied_slopes(scene, T, t, a)
-    add_marker_forces_slopes(scene, T, a)
-    add_joint_frictions_slopes(scene, T, t, a)
-    fill_state_slopes(scene, T, t, a)
+@jitable
+def add_slopes(scene: Scene, T: Tangent, t: float, y: F1) -> int:
+    """Add the derivatives of all forces between two markers and of states' slopes; return 0."""
+    code = add_applied_slopes(scene, T, t, y)
+    add_marker_forces_slopes(scene, T, y)
+    add_joint_frictions_slopes(scene, T, t, y)
+    fill_state_slopes(scene, T, t, y)
     return code
 
 
-def residual_slopes(context: int, t: float, y: Pointer) -> int:
-    """The derivatives of all forces between markers, elements among them, and of states' slopes."""
+def slopes_with_both(context: int, t: float, y: Pointer) -> int:
+    """The same, of both."""
     scene, T, a = placed(context, y)
-    code = add_applied_slopes(scene, T, t, a)
-    add_marker_forces_slopes(scene, T, a)
-    add_joint_frictions_slopes(scene, T, t, a)
-    fill_state_slopes(scene, T, t, a)
+    return add_slopes(scene, T, t, a)
+
+
+def slopes_with_multi_points(context: int, t: float, y: Pointer) -> int:
+    """The same, of forces of several markers too."""
+    scene, T, a = placed(context, y)
+    add_multi_point_slopes(scene, T, a)
+    return add_slopes(scene, T, t, a)
+
+
+def residual_slopes(context: int, t: float, y: Pointer) -> int:
+    """The derivatives of all forces between two markers, elements among them, and of slopes."""
+    scene, T, a = placed(context, y)
+    code = add_slopes(scene, T, t, a)
+    add_all_residual_slopes(scene, T, t, a)
+    return code
+
+
+def all_slopes(context: int, t: float, y: Pointer) -> int:
+    """The same, of forces of several markers too."""
+    scene, T, a = placed(context, y)
+    add_multi_point_slopes(scene, T, a)
+    code = add_slopes(scene, T, t, a)
     add_all_residual_slopes(scene, T, t, a)
     return code
 

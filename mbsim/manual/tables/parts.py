@@ -174,7 +174,9 @@ def functions(_: str, page: Page) -> list[str]:
             lines += [f"Of {sort.value}:", ""]
             lines += rows(("function", "value"), ((f"`{f.call}`", f.about) for f in own))
             lines.append("")
-    ranges = ", ".join(f"`{name}` {low} to {high}" for name, (low, high) in CHOICES.items())
+    ranges = ", ".join(
+        f"`{name}` {low} to {high}" for name, (low, high) in CHOICES.items() if name != "point"
+    )
     return [*lines, *item(f"Arguments that are whole numbers: {ranges}.")]
 
 

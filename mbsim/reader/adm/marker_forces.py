@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from mbsim.forces.catalog import FORCES, Adams, ForceKind
-from mbsim.reader.adm.declare import AdmStatement, numbers
+from mbsim.reader.adm.declare import IDS_BY_COMMAS, AdmStatement, numbers
+from mbsim.reader.adm.translate import read_as
 from mbsim.reader.forces import add_force, kind_of
-from mbsim.reader.kinds import ID
+from mbsim.reader.kinds import ID, NOT_NEGATIVE
+from mbsim.reader.multi_point import FORCE_MULTI_POINT
 from mbsim.reader.statement import Entry, Spec
 
 
@@ -48,6 +50,37 @@ def _statement(kind: ForceKind, adams: Adams) -> AdmStatement:
     attributes = {name: Spec(ID, required=True) for name in ("id", "I", "J")}
     attributes |= {word: spec(word) for word in adams.words}
     return AdmStatement(adams.name, attributes, build, xml=kind.statement)
+
+
+def _build_many(entry: Entry) -> None:
+    """Add a force between many markers."""
+    names = {
+        "IMARKERS": "i_marker_ids",
+        "J": "ref_marker_id",
+        "KMATRIX": "kmtx_id",
+        "CMATRIX": "cmtx_id",
+        "CRATIO": "cratio",
+        "FORCE": "preload_mtx_id",
+        "LENGTH": "length_mtx_id",
+    }
+    read_as(entry, FORCE_MULTI_POINT, names)
+
+
+NFORCE = AdmStatement(
+    "NFORCE",
+    {
+        "id": Spec(ID, required=True),
+        "IMARKERS": Spec(IDS_BY_COMMAS, required=True),
+        "J": Spec(ID, required=True),
+        "KMATRIX": Spec(ID, required=True),
+        "CMATRIX": Spec(ID),
+        "CRATIO": Spec(NOT_NEGATIVE),
+        "FORCE": Spec(ID),
+        "LENGTH": Spec(ID),
+    },
+    _build_many,
+    xml="Force_MultiPoint",
+)
 
 
 def marker_forces() -> list[AdmStatement]:

@@ -54,7 +54,7 @@ from mbsim.reader.adm.forces import (
 )
 from mbsim.reader.adm.friction import FRICTION
 from mbsim.reader.adm.linear_systems import LSE, MATRIX, PINPUT, POUTPUT, TFSISO, VARIABLES
-from mbsim.reader.adm.marker_forces import marker_forces
+from mbsim.reader.adm.marker_forces import NFORCE, marker_forces
 from mbsim.reader.keywords import fold
 from mbsim.reader.kinds import (
     COUNT,
@@ -290,6 +290,7 @@ STATEMENTS = (
         xml="Force_Scalar_TwoBody",
     ),
     *marker_forces(),
+    NFORCE,
     _vector("VFORCE", COMPONENTS[:3]),
     _vector("VTORQUE", COMPONENTS[3:]),
     _vector("GFORCE", COMPONENTS),

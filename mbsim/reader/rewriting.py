@@ -1,0 +1,78 @@
+"""Expressions of a draft with some of their functions replaced, when all of the deck is known."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from mbsim.errors import Fault
+from mbsim.expressions.tree import Call, Expression, Node
+from mbsim.model.source import Source
+
+if TYPE_CHECKING:
+    from mbsim.reader.draft import Draft
+
+
+class Rewriting:
+    """Replaces functions in all expressions that a draft holds; `call` says which, and by what."""
+
+    def __init__(self, draft: Draft) -> None:
+        self.draft = draft
+        self.faults: list[Fault] = []
+        self.source = Source()
+
+    def call(self, node: Call) -> Node | None:
+        """Return what a function means, None to leave it as it is."""
+        raise NotImplementedError
+
+    def fault(self, statement: str, id: int, said: str) -> None:
+        """Add a fault of an element, where the expression stands that shows it."""
+        self.faults.append(Fault(self.source.file, self.source.line, f"{statement}[{id}]", said))
+
+    def rewrite(self) -> None:
+        """Rewrite the elements and simulations of the draft."""
+        for table in dataclasses.fields(self.draft):
+            old = getattr(self.draft, table.name)
+            if isinstance(old, dict):
+                setattr(self.draft, table.name, self(old))
+        self.draft.simulations = self(self.draft.simulations)
+
+    def __call__(self, value: Any) -> Any:
+        """Return a value with its expressions rewritten; the same one where none is."""
+        if isinstance(value, Expression):
+            root = self.node(value.root)
+            return value if root is value.root else Expression(value.text, root)
+        if isinstance(value, dict):
+            return self._kept(
+                value, list(value.values()), lambda new: dict(zip(value, new, strict=True))
+            )
+        if isinstance(value, (list, tuple)) and type(value) in (list, tuple):
+            return self._kept(value, list(value), type(value))
+        if dataclasses.is_dataclass(value) and not isinstance(value, type):
+            self.source = getattr(value, "source", self.source)
+            names = [each.name for each in dataclasses.fields(value) if each.init]
+            old = [getattr(value, name) for name in names]
+            made: Any = value
+            return self._kept(
+                value,
+                old,
+                lambda new: dataclasses.replace(made, **dict(zip(names, new, strict=True))),
+            )
+        return value
+
+    def _kept(self, value: Any, old: list[Any], make: Callable[[list[Any]], Any]) -> Any:
+        """Return what `make` makes of rewritten parts, the value itself where all are the same."""
+        new = [self(part) for part in old]
+        return value if all(a is b for a, b in zip(old, new, strict=True)) else make(new)
+
+    def node(self, node: Node) -> Node:
+        """Return a tree with functions replaced."""
+        if not isinstance(node, Call):
+            return node
+        found = self.call(node)
+        if found is not None:
+            return found
+        args = tuple(self.node(arg) for arg in node.args)
+        same = all(a is b for a, b in zip(args, node.args, strict=True))
+        return node if same else Call(node.name, args, node.column)
