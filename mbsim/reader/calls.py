@@ -25,7 +25,7 @@ _NAMED_BY = {
     "graphics": ("Post_Graphic",),
     "joint": ("Constraint_Joint",),
     "array": ("Reference_Array",),
-    "matrix": ("Reference_Matrix",),
+    **dict.fromkeys(("matrix", "mtx", "kmtx", "cmtx"), ("Reference_Matrix",)),
     "curve": ("Reference_ParamCurve",),
     **dict.fromkeys(("joint1", "joint2", "joint3"), ("Constraint_Joint",)),
     "pinput": ("Control_PlantInput",),

@@ -143,12 +143,11 @@ def _wrench(scene: Scene) -> Callable[..., Any]:
     """Return what adds the wrenches that there are, so that no other is compiled."""
     from mbsim.dynamics.pipeline import force_hooks as of
 
-    form = scene.applied.form
-    if (form == MULTI_POINT).any():
+    forms = set(scene.applied.form.tolist())
+    if MULTI_POINT in forms:
         return of.act_by_any_wrench
-    vectors = np.isin(form, (VECTOR_FORCE, RESIDUAL)).any()
-    if (form == WRENCH).any():
-        return of.act_by_wrench if vectors else of.act_by_marker_force
+    if WRENCH in forms:
+        return of.act_by_wrench if forms & {VECTOR_FORCE, RESIDUAL} else of.act_by_marker_force
     return of.act_by_vector_force
 
 
@@ -194,18 +193,15 @@ def _has_memory(scene: Scene, method: Method) -> bool:
 
 
 def _needs_slopes(scene: Scene, method: Method) -> bool:
-    acts = len(scene.applied.form) > 0 or len(scene.states.program) > 0
-    return method.tangent is not None and acts
+    return method.tangent is not None and len(scene.applied.form) + len(scene.states.program) > 0
 
 
 def _slopes(scene: Scene) -> Callable[..., Any]:
     forms = set(scene.applied.form.tolist())
     from mbsim.dynamics.pipeline import implicit_hooks as of
 
-    if MULTI_POINT in forms:
-        return of.all_slopes if RESIDUAL in forms else of.slopes_with_multi_points
-    if RESIDUAL in forms:
-        return of.residual_slopes
+    if MULTI_POINT in forms or RESIDUAL in forms:
+        return of.all_slopes if MULTI_POINT in forms else of.residual_slopes
     has_friction = bool((scene.applied.connection >= 0).any())
     if WRENCH in forms:
         return of.slopes_with_both if has_friction else of.slopes_with_marker_forces

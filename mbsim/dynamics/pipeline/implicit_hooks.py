@@ -130,13 +130,6 @@ def slopes_with_both(context: int, t: float, y: Pointer) -> int:
     return add_slopes(scene, T, t, a)
 
 
-def slopes_with_multi_points(context: int, t: float, y: Pointer) -> int:
-    """The same, of forces of several markers too."""
-    scene, T, a = placed(context, y)
-    add_multi_point_slopes(scene, T, a)
-    return add_slopes(scene, T, t, a)
-
-
 def residual_slopes(context: int, t: float, y: Pointer) -> int:
     """The derivatives of all forces between two markers, elements among them, and of slopes."""
     scene, T, a = placed(context, y)
