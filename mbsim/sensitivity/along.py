@@ -20,6 +20,7 @@ from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import ASK
+from mbsim.dynamics.contact.forces import BRANCH, FOUND_AT
 from mbsim.integrators.dopri5 import (
     A21,
     A31,
@@ -53,6 +54,7 @@ from mbsim.integrators.dopri5 import (
     E7,
 )  # fmt: skip
 from mbsim.integrators.scheme import Method, in_workspace
+from mbsim.laws.catalog import UNDECIDED
 from mbsim.sensitivity.arrays import (
     ALIKE,
     BEFORE,
@@ -94,6 +96,8 @@ NEAREST, FARTHER = 1e-12, 4.0
 LEAST = 1e-4
 #: A change is looked for within so many lengths of a step of where the run has it.
 FARTHEST = 100.0
+#: Stands for a change of whatever branch where a slot is taken; those of single slots are below.
+ANY_BRANCH = -1
 #: A jump of f counts if what it does to y over the step is more than this part of the usual size.
 JUMPS = 1e-13
 
@@ -237,12 +241,18 @@ def integrate(
 
 
 @jitable
+def branch_of(s: int) -> int:
+    """Return what stands for the branch of slot s in place of a slot, and back."""
+    return ANY_BRANCH - 1 - s
+
+
+@jitable
 def touches(
     V: Variations, scene: Scene, t: float, h: float, k: int, s: float, e: float, slot: int
 ) -> int:
     """Return 1 if a slot touches at the part s of the step, moved by e; 0 if not, less a code.
 
-    With a slot below 0: if a force is on another branch.
+    With a slot below 0: if a force is on another branch, ANY_BRANCH, or that of one slot.
     """
     twin, w = view(V.words[TWIN], Scene), V.work
     p = in_workspace(V.words[UP])[0]
@@ -251,9 +261,16 @@ def touches(
         for i in range(V.next.shape[1]):
             w[POINT, i] += e * V.next[k, i]
     if slot < 0:
-        # asked of all branches at once
+        # rates of forces were those of another point
+        twin.work.slot[:, FOUND_AT] = math.nan
         answer = call_int(p.switching, (p.context, t + s * h, ASK, w[POINT], w[UPPER]))
-        return min(answer, 1)
+        if slot == ANY_BRANCH or answer < 0:
+            return min(answer, 1)
+        asked = branch_of(slot)
+        if twin.work.touching[asked] == 0:
+            return 0
+        branch = twin.work.slot[asked, BRANCH]
+        return 1 if branch != UNDECIDED and branch != scene.state.mode[asked] else 0
     code = call_int(p.rhs, (p.context, t + s * h, s * h, w[POINT], w[UPPER]))
     return -code if code != 0 else twin.work.touching[slot]
 

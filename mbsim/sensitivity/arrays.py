@@ -22,9 +22,10 @@ COMMIT, OUTPUT, METHOD, TWIN, UP, DOWN, ATTEMPT, FIT_DENSE, REMEMBERED = range(9
 FITTED, ROWS, JOINTS, CHANGES, RHS, ORDERED, ALIKE = range(9, 16)
 # evaluations beside the run; derivatives of steps that were taken along the motion
 ASKED, BENT = 17, 18
-# whether points are on a straight line instead of on the step's polynomial
-STRAIGHT = 19
-WORDS = 20
+# whether points are on a straight line instead of on the step's polynomial; whether friction asks
+# for another branch beside the run than in it at the end of a step
+STRAIGHT, ODD = 19, 20
+WORDS = 21
 #: Rows of `Variations.jump`: y before the commit, f before and behind it.
 BEFORE, F_BEFORE, F_BEHIND = range(3)
 #: Contacts that may begin or end within one step.
@@ -39,6 +40,7 @@ class Variations(NamedTuple):
     d: F2  # (P, n) derivative of y at the committed point
     memory: F3  # (P, ns, most) of what friction laws remember: `State.memory`
     before: F3  # (P, ns, most) of `State.before`
+    end: tags.Scratch[F3]  # (P, ns, most) of what laws remember at the end of the step taken
     lost: F1  # (P,) time from which a derivative is not known, inf while it is
     why: I1  # (P,) for what reason: LOST_...
     dense: F3  # (P, coefficients, n) of the last step, as `Method.dense`
@@ -51,11 +53,12 @@ class Variations(NamedTuple):
     enough: tags.Constant[F1]  # (1,) how large that may be
     bends: tags.Scratch[I1]  # (P,) 1 where the last step was taken along the motion
     jump: tags.Scratch[F2]  # (3, n) see BEFORE
-    late: tags.Scratch[F3]  # (P, ns, most) of what laws remember behind a change of branch
-    middle: tags.Scratch[F3]  # (P, ns, most) mean of both sides there
+    middle: tags.Scratch[F3]  # (P, ns, most) mean of both sides behind a change of branch
     mode: tags.Scratch[F1]  # (ns,) `State.mode` before it
     line: tags.Scratch[F1]  # (1,) length of the straight line [T]
-    shift: tags.Scratch[F1]  # (P,) by how much the end of the step is later, by the parameter
+    # (P, ns + 1) by how much slots change their branch later, by the parameter; what else does last
+    shift: tags.Scratch[F2]
+    asks: tags.Scratch[I1]  # (ns + 1,) slots that ask for another branch, their number last
     reason: tags.Scratch[F1]  # (P,) why a derivative is lost at the end of the step, or 0
     seen: tags.Scratch[I1]  # (ns + 1,) in how many points of a step slots touched, of how many
     kept: tags.Scratch[F2]  # (P, n) derivative at the begin of the last step

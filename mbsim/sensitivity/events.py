@@ -7,6 +7,15 @@ With y+ = R(t, y-) at the time t* of the change, and f- and f+ on its sides,
 R being y itself but for what friction carries, which begins as another number (transfer condition;
 S. Galan, W. F. Feehery, P. I. Barton, Appl. Numer. Math. 31 (1999) 17). dt*/dp is found as
 the time was: where both sides of the difference, carried on along f-, ask for the other branch.
+
+Points of a body stick and slip nearly at once, nearer to each other than both sides of any
+difference. But each has a time of its own: within a step friction keeps to its committed branch,
+so that forces are smooth on both sides of every point's time, whatever others ask for. Forces of
+points add up, and so do what they jump by,
+
+    D+ = R_y D- + R_p + sum over points i of (f without i's change - f with it) dt_i*/dp,
+
+to the first order in whatever order the changes are.
 """
 
 from __future__ import annotations
@@ -18,111 +27,149 @@ from mbsim.core.address import call_int, view
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import ASK
+from mbsim.dynamics.contact.forces import BRANCH as ASKED_BRANCH
+from mbsim.dynamics.contact.forces import FOUND_AT, contact_of
 from mbsim.integrators.scheme import in_workspace
-from mbsim.sensitivity.along import crossing
+from mbsim.laws.catalog import BRANCHES, UNDECIDED
+from mbsim.sensitivity.along import ANY_BRANCH, branch_of, crossing
 from mbsim.sensitivity.arrays import (
     BEFORE,
     F_BEFORE,
     F_BEHIND,
     LOST_GRAZING,
     LOST_JUMP,
+    ODD,
     REMEMBERED,
     TWIN,
     UP,
     Variations,
 )
-from mbsim.sensitivity.twin import half_step, set_parameter
+from mbsim.sensitivity.twin import half_step, is_asked, keep_change, keep_side, set_parameter
 
-#: Stands for a change of branch where `crossing` takes a slot.
-BRANCH = -1
 #: Times of changes are looked for along a straight line as long as this part of the problem's own
 #: time; how far behind them what friction keeps is asked for, over that.
 SPAN, BEHIND = 1e-4, 1e-5
-#: Changes of several points of a body follow each other: the difference is so much shorter then.
-SHORTER = 0.01
 #: By how much, over that, what is kept may differ between the run and both sides.
 ALIKE = 0.03
 #: So often a shorter difference is tried for the time of a change.
 TRIES = 4
 #: A jump of f below this part of its size is none.
 NONE = 1e-9
+#: Rows of `Variations.work`: a point, f there, f with one change less.
+POINT, WITH, WITHOUT = range(3)
 
 
 @jitable
-def note_shift(V: Variations, scene: Scene, t: float, H: float, k: int) -> None:
-    """Find how fast the time t, at which a branch changes, moves with parameter k."""
-    twin, e = view(V.words[TWIN], Scene), SHORTER * half_step(V, k)
+def asks(scene: Scene, s: int) -> bool:
+    """Return whether friction in slot s will be on another branch than it is committed to."""
+    branch, state = scene.work.slot[s, ASKED_BRANCH], scene.state
+    goes_on = state.touching[s] == 1 and scene.work.touching[s] == 1
+    return goes_on and branch != UNDECIDED and branch != state.mode[s]
+
+
+@jitable
+def list_asking(V: Variations, scene: Scene, switched: bool) -> None:
+    """List the slots that change their branch at the end of the step."""
+    hit, count, last = scene.work.hit, 0, len(V.asks) - 1
+    for j in range(hit[len(hit) - 1] if switched and V.words[REMEMBERED] > 0 else 0):
+        if asks(scene, hit[j]):
+            V.asks[count] = hit[j]
+            count += 1
+    V.asks[last] = count
+    for s in range(len(V.mode)):
+        V.mode[s] = scene.state.mode[s]
+
+
+@jitable
+def shift_of(V: Variations, scene: Scene, t: float, H: float, k: int, what: int) -> float:
+    """Return how fast the time t, at which something changes, moves with parameter k, else NaN."""
+    e = half_step(V, k)
+    for _ in range(TRIES):
+        up = crossing(V, scene, t - H, H, k, e, what, 1.0)
+        down = crossing(V, scene, t - H, H, k, -e, what, 1.0)
+        if abs(up - down) < math.inf:
+            return 0.5 / e * (up - down) * H
+        e *= 0.1
+    return math.nan
+
+
+@jitable
+def note_shifts(V: Variations, scene: Scene, t: float, H: float, k: int) -> None:
+    """Find how fast the times of all changes at time t move with parameter k."""
+    twin, last = view(V.words[TWIN], Scene), len(V.asks) - 1
     for j in range(len(twin.state.chattering)):
         twin.state.chattering[j] = scene.state.chattering[j]
-    V.shift[k] = math.nan
-    for _ in range(TRIES):
-        up = crossing(V, scene, t - H, H, k, e, BRANCH, 1.0)
-        down = crossing(V, scene, t - H, H, k, -e, BRANCH, 1.0)
-        if abs(up - down) < math.inf:
-            V.shift[k] = 0.5 / e * (up - down) * H
-            return
-        e *= 0.1
+    for j in range(V.asks[last]):
+        s = V.asks[j]
+        V.shift[k, s] = shift_of(V, scene, t, H, k, branch_of(s))
+    if V.asks[last] == 0:
+        V.shift[k, last] = shift_of(V, scene, t, H, k, ANY_BRANCH)
 
 
 @jitable
-def memory_beside(
-    V: Variations, scene: Scene, t: float, k: int, x: float, late: float, side: int
-) -> None:
-    """Leave what laws keep at a time `late` after t, with parameter k changed by x."""
-    twin, w = view(V.words[TWIN], Scene), V.work[0]
+def ask_beside(V: Variations, scene: Scene, t: float, k: int, x: float, late: float) -> int:
+    """Let laws decide at a time `late` after t, with parameter k changed by x; return a code."""
+    twin, w = view(V.words[TWIN], Scene), V.work[POINT]
     p = in_workspace(V.words[UP])[0]
     set_parameter(V, twin, scene, k, x)
     for i in range(len(w)):
         w[i] = V.jump[BEFORE, i] + x * V.next[k, i] + late * V.jump[F_BEFORE, i]
-    if late > 0.0:
-        # what a law decides by rates of forces it decides where it is asked for its branch
-        code = min(call_int(p.switching, (p.context, t + late, ASK, w, V.work[1])), 0)
-    else:
-        code = call_int(p.rhs, (p.context, t + late, 0.0, w, V.work[1]))
-    if code != 0:
-        V.shift[k] = math.nan
-    for s in range(V.far.shape[1]):
-        for j in range(V.far.shape[2]):
-            V.far[side, s, j] = twin.work.memory[s, j] if twin.work.touching[s] == 1 else 0.0
+    # rates of forces were those of another point
+    twin.work.slot[:, FOUND_AT] = math.nan
+    return min(call_int(p.switching, (p.context, t + late, ASK, w, V.work[WITH])), 0)
 
 
 @jitable
-def note_memory(V: Variations, scene: Scene, t: float, H: float, k: int) -> None:
-    """Find what friction keeps before and behind a change of branch.
+def note_kept(V: Variations, scene: Scene, t: float, H: float, k: int) -> None:
+    """Find how what friction keeps where it is on another branch beside the run moves.
 
-    Of what does not change a little before it: points of one body come to rest one by one, nearer
-    to each other than the difference is wide, and what a law keeps is another number then. Of what
-    changes a little behind it, each side at its own time.
+    A little before the end of the step, and nearer to the run: on another branch what a law keeps
+    is another number.
     """
-    margin, e = BEHIND * H, half_step(V, k)
-    e = min(e, 0.3 * margin / max(abs(V.shift[k]), 1e-300))
-    for turn in range(2):
+    e, back, twin = half_step(V, k), BEHIND * H, view(V.words[TWIN], Scene)
+    for _ in range(2 * TRIES):
+        V.words[ODD] = 0
+        for side in range(2):
+            if ask_beside(V, scene, t, k, e if side == 0 else -e, -back) != 0:
+                return
+            keep_side(V, twin, scene, side)
+        if V.words[ODD] == 0:
+            keep_change(V, k, e)
+            return
+        e, back = 0.3 * e, 3.0 * back
+
+
+@jitable
+def note_changed(V: Variations, scene: Scene, t: float, H: float, k: int) -> None:
+    """Find how what friction keeps behind its change of branch moves with parameter k.
+
+    A little behind it, each side and each point at its own time.
+    """
+    margin, e, twin = BEHIND * H, half_step(V, k), view(V.words[TWIN], Scene)
+    for a in range(V.asks[len(V.asks) - 1]):
+        s = V.asks[a]
+        if not abs(V.shift[k, s]) < math.inf:
+            continue
         for side in range(2):
             x = e if side == 0 else -e
-            late = -margin if turn == 0 else margin + x * V.shift[k]
-            memory_beside(V, scene, t, k, x, late, side)
-        for s in range(V.far.shape[1]):
-            for j in range(V.far.shape[2]):
-                change = 0.5 / e * (V.far[0, s, j] - V.far[1, s, j])
-                if turn == 0:
-                    V.memory[k, s, j] = change
-                else:
-                    V.late[k, s, j] = change
-                    V.middle[k, s, j] = 0.5 * (V.far[0, s, j] + V.far[1, s, j])
-    for s in range(len(V.mode)):
-        V.mode[s] = scene.state.mode[s]
+            if ask_beside(V, scene, t, k, x, margin + x * V.shift[k, s]) != 0:
+                V.shift[k, s] = math.nan
+            keep_side(V, twin, scene, side)
+        for j in range(V.far.shape[2]):
+            V.end[k, s, j] = 0.5 / e * (V.far[0, s, j] - V.far[1, s, j])
+            V.middle[k, s, j] = 0.5 * (V.far[0, s, j] + V.far[1, s, j])
 
 
 @jitable
 def note_rates(V: Variations, twin: Scene, t: float, H: float, y: F1) -> None:
     """Find how fast what friction keeps changes behind time t, where y' is known."""
     p = in_workspace(V.words[UP])[0]
-    w = V.work[0]
+    w = V.work[POINT]
     for side in range(2):
         late = BEHIND * H * (2.0 - side)
         for i in range(len(w)):
             w[i] = y[i] + late * V.jump[F_BEHIND, i]
-        if call_int(p.rhs, (p.context, t + late, 0.0, w, V.work[1])) != 0:
+        if call_int(p.rhs, (p.context, t + late, 0.0, w, V.work[WITH])) != 0:
             return
         for s in range(V.far.shape[1]):
             for j in range(V.far.shape[2]):
@@ -133,25 +180,10 @@ def note_rates(V: Variations, twin: Scene, t: float, H: float, y: F1) -> None:
 
 
 @jitable
-def carried_memory(V: Variations, scene: Scene, k: int, i: int) -> float:
-    """Return the derivative of what y[i], which friction carries, begins as."""
-    for s in range(len(scene.slots.z)):
-        z = scene.slots.z[s]
-        c = scene.kinds.contact[scene.pairs.kind[scene.slots.pair[s]]]
-        if z >= 0 and z <= i < z + scene.contacts.carried[c]:
-            return V.late[k, s, i - z]
-    return 0.0
-
-
-@jitable
 def alike(V: Variations, scene: Scene, k: int, s: int) -> bool:
-    """Return whether slot s keeps behind a change what both sides of the difference keep there.
-
-    It does not where several points change in so short a time that these ask for other branches.
-    """
-    c = scene.kinds.contact[scene.pairs.kind[scene.slots.pair[s]]]
+    """Return whether slot s keeps behind a change what both sides of the difference keep there."""
     off, size = 0.0, 0.0
-    for j in range(scene.contacts.carried[c]):
+    for j in range(scene.contacts.carried[contact_of(scene, s)]):
         kept = scene.state.memory[s, j]
         off = max(off, abs(V.middle[k, s, j] - kept))
         size = max(size, abs(kept))
@@ -159,41 +191,113 @@ def alike(V: Variations, scene: Scene, k: int, s: int) -> bool:
 
 
 @jitable
-def cross(V: Variations, scene: Scene, t: float, y: F1, switched: bool, lost: F1) -> None:
+def size_of(V: Variations, f: F1, g: F1) -> float:
+    """Return the largest difference of two f, in usual sizes."""
+    largest = 0.0
+    for i in range(len(f)):
+        largest = max(largest, abs(f[i] - g[i]) / V.scale[i])
+    return largest
+
+
+@jitable
+def jump_by(V: Variations, before: F1, behind: F1, usual: float, at: int, why: int) -> None:
+    """Let all derivatives jump where f does, at the times in column `at` of `shift`."""
+    if size_of(V, before, behind) <= NONE * usual:
+        return
+    for k in range(len(V.size)):
+        shift = V.shift[k, at]
+        if not abs(shift) < math.inf:
+            V.reason[k] = why
+        for i in range(len(before)):
+            V.next[k, i] += (before[i] - behind[i]) * shift
+
+
+@jitable
+def unmake(V: Variations, twin: Scene, scene: Scene, s: int, undo: bool, w: F1) -> None:
+    """Let slot s of the twin be as it was before its change of branch, or as it is behind it."""
+    kept = scene.state.before if undo else scene.state.memory
+    for j in range(kept.shape[1]):
+        twin.state.memory[s, j] = kept[s, j]
+    z, then = scene.slots.z[s], scene.state.mode[s] % BRANCHES
+    if then != V.mode[s] % BRANCHES:
+        for j in range(scene.contacts.carried[contact_of(scene, s)]):
+            w[z + j] = V.jump[BEFORE, z + j] if undo else scene.state.memory[s, j]
+
+
+@jitable
+def jump_one_by_one(V: Variations, scene: Scene, t: float, y: F1, usual: float) -> int:
+    """Let all derivatives jump as one point after the other changes its branch; return a code."""
+    twin, w = view(V.words[TWIN], Scene), V.work[POINT]
+    p, last = in_workspace(V.words[UP])[0], len(V.asks) - 1
+    for i in range(len(y)):
+        w[i] = y[i]
+    for a in range(V.asks[last]):
+        unmake(V, twin, scene, V.asks[a], True, w)
+    code = call_int(p.rhs, (p.context, t, 0.0, w, V.work[WITHOUT]))
+    # what is not of these points
+    jump_by(V, V.jump[F_BEFORE], V.work[WITHOUT], usual, last, LOST_JUMP)
+    for a in range(V.asks[last]):
+        s = V.asks[a]
+        unmake(V, twin, scene, s, False, w)
+        code = code or call_int(p.rhs, (p.context, t, 0.0, w, V.work[WITH]))
+        jump_by(V, V.work[WITHOUT], V.work[WITH], usual, s, LOST_GRAZING)
+        for i in range(len(y)):
+            V.work[WITHOUT, i] = V.work[WITH, i]
+    return code
+
+
+@jitable
+def begin_changed(V: Variations, scene: Scene, k: int, s: int) -> None:
+    """Let derivative k of what slot s keeps and carries begin anew behind its change of branch."""
+    z, shift = scene.slots.z[s], V.shift[k, s]
+    if scene.state.mode[s] % BRANCHES != V.mode[s] % BRANCHES:
+        for j in range(scene.contacts.carried[contact_of(scene, s)]):
+            V.next[k, z + j] = V.end[k, s, j] - V.jump[F_BEHIND, z + j] * shift
+        if not abs(shift) < math.inf:
+            V.reason[k] = LOST_GRAZING
+        elif not alike(V, scene, k, s):
+            V.reason[k] = LOST_JUMP
+    # what is kept is that of each side's own time; the run has one time for all
+    for j in range(V.end.shape[2]):
+        V.end[k, s, j] -= V.far[0, s, j] * shift
+
+
+@jitable
+def changes_unasked(V: Variations, scene: Scene) -> bool:
+    """Return whether a slot has changed its branch that was not seen to."""
+    state = scene.state
+    for s in range(len(V.mode)):
+        changed = state.touching[s] == 1 and V.mode[s] > 0.0 and state.mode[s] != V.mode[s]
+        if changed and not is_asked(V, s):
+            return True
+    return False
+
+
+@jitable
+def cross(V: Variations, scene: Scene, t: float, y: F1, switched: bool) -> None:
     """Let all derivatives in `next` jump with what a commit has changed; y is behind it.
 
-    `lost` gets the reason why a derivative is not known from here on, 0 where it is.
+    `reason` gets why a derivative is not known from here on, 0 where it is.
     """
-    twin, n = view(V.words[TWIN], Scene), len(y)
+    twin, n, last = view(V.words[TWIN], Scene), len(y), len(V.asks) - 1
     p = in_workspace(V.words[UP])[0]
     set_parameter(V, twin, scene, 0, 0.0)
     code = call_int(p.rhs, (p.context, t, 0.0, y, V.jump[F_BEHIND]))
-    if switched and V.words[REMEMBERED] > 0 and code == 0:
-        note_rates(V, twin, t, V.line[0], y)
-    largest, usual = 0.0, 0.0
+    usual = 0.0
     for i in range(n):
         usual = max(usual, abs(V.jump[F_BEFORE, i]) / V.scale[i])
-        largest = max(largest, abs(V.jump[F_BEFORE, i] - V.jump[F_BEHIND, i]) / V.scale[i])
-    jumps = code != 0 or not largest <= NONE * usual
+    if switched and V.asks[last] > 0 and code == 0:
+        note_rates(V, twin, t, V.line[0], y)
+        code = jump_one_by_one(V, scene, t, y, usual)
+    elif code == 0:
+        why = LOST_GRAZING if switched else LOST_JUMP
+        jump_by(V, V.jump[F_BEFORE], V.jump[F_BEHIND], usual, last, why)
+    unseen = V.words[REMEMBERED] > 0 and switched and changes_unasked(V, scene)
     for k in range(len(V.size)):
-        shift = V.shift[k] if switched else 0.0
-        if jumps and not switched:
-            lost[k] = LOST_JUMP
-        elif jumps and not abs(shift) < math.inf:
-            lost[k] = LOST_GRAZING
         for i in range(n):
             if y[i] != V.jump[BEFORE, i] and y[i] == 0.0:
                 V.next[k, i] = 0.0
-            elif y[i] != V.jump[BEFORE, i] and V.words[REMEMBERED] > 0:
-                begins = carried_memory(V, scene, k, i)
-                V.next[k, i] = begins - (V.jump[F_BEHIND, i] * shift if jumps else 0.0)
-            elif jumps:
-                V.next[k, i] += (V.jump[F_BEFORE, i] - V.jump[F_BEHIND, i]) * shift
-        for s in range(len(V.mode) if switched else 0):
-            if scene.state.mode[s] != V.mode[s]:
-                if V.words[REMEMBERED] > 0 and not alike(V, scene, k, s):
-                    lost[k] = LOST_JUMP
-                # what is kept is that of each side's own time; the run has one time for all
-                for j in range(V.memory.shape[2]):
-                    rate = V.far[0, s, j] if jumps else 0.0
-                    V.memory[k, s, j] = V.late[k, s, j] - rate * shift
+        for a in range(V.asks[last] if switched else 0):
+            begin_changed(V, scene, k, V.asks[a])
+        if code != 0 or unseen:
+            V.reason[k] = LOST_JUMP

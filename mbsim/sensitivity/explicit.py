@@ -20,7 +20,7 @@ from mbsim.sensitivity.arrays import (
     UP,
     Variations,
 )
-from mbsim.sensitivity.twin import beside, half_step, set_parameter
+from mbsim.sensitivity.twin import beside, half_step, keep_change, keep_side, set_parameter
 
 
 @jitable
@@ -37,9 +37,7 @@ def step_beside(
     if code == 0:
         code = call_int(V.words[ATTEMPT], (workspace, t, h, own.y, own.trial))
     if code == 0 and V.words[REMEMBERED] > 0:
-        for s in range(V.far.shape[1]):
-            for j in range(V.far.shape[2]):
-                V.far[side, s, j] = twin.work.memory[s, j] if twin.work.touching[s] == 1 else 0.0
+        keep_side(V, twin, scene, side)
     return code
 
 
@@ -66,9 +64,7 @@ def explicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k:
         whole = max(whole, abs(V.next[k, i]) / V.scale[i], abs(V.d[k, i]) / V.scale[i])
     V.error[k] = error / whole
     if V.words[REMEMBERED] > 0:
-        for s in range(V.far.shape[1]):
-            for j in range(V.far.shape[2]):
-                V.far[0, s, j] = part * (V.far[0, s, j] - V.far[1, s, j])
+        keep_change(V, k, e)
     return 0
 
 

@@ -40,6 +40,7 @@ from mbsim.sensitivity.arrays import (
     LOST_FAILED,
     LOST_LARGE,
     METHOD,
+    ODD,
     ORDERED,
     OUTPUT,
     REMEMBERED,
@@ -50,7 +51,14 @@ from mbsim.sensitivity.arrays import (
     UP,
     Variations,
 )
-from mbsim.sensitivity.events import SPAN, cross, note_memory, note_shift
+from mbsim.sensitivity.events import (
+    SPAN,
+    cross,
+    list_asking,
+    note_changed,
+    note_kept,
+    note_shifts,
+)
 from mbsim.sensitivity.explicit import explicit_step, fit_beside
 from mbsim.sensitivity.implicit import implicit_step
 from mbsim.sensitivity.twin import half_step, set_parameter
@@ -122,13 +130,11 @@ def take_step(V: Variations, scene: Scene, m: Method, t: float, h: float) -> Non
     for k in range(len(V.size)):
         if V.lost[k] < math.inf:
             continue
+        V.words[ODD] = 0
         if not listed or carry(V, scene, m, t, h, k) != 0:
             lose(V, k, t, LOST_FAILED)
-        elif V.words[REMEMBERED] > 0:
-            for s in range(V.memory.shape[1]):
-                for j in range(V.memory.shape[2]):
-                    V.before[k, s, j] = V.memory[k, s, j]
-                    V.memory[k, s, j] = V.far[0, s, j]
+        elif V.words[REMEMBERED] > 0 and V.words[ODD] == 1:
+            note_kept(V, scene, t + h, V.line[0], k)
         set_parameter(V, twin, scene, k, 0.0)
 
 
@@ -154,21 +160,28 @@ def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int
         return call_int(V.words[COMMIT], (context, t, h, a, b))
     n = len(m.y)
     y, f = vector_at(a, n), vector_at(b, n)
-    take_step(V, scene, m, t - h, h)
     switched = p.switching != 0 and m.memory[SWITCHED] > 0.0
     for i in range(n):
         V.jump[BEFORE, i], V.jump[F_BEFORE, i] = y[i], f[i]
+    # of a very short step, as many end at a branch, the polynomial is all rounding
+    V.line[0] = SPAN * m.memory[OWN_TIME]
+    V.shift[:] = math.nan
+    list_asking(V, scene, switched)
+    take_step(V, scene, m, t - h, h)
     if switched:
-        note_changes(V, scene, m, t)
+        note_changes(V, scene, t)
     word = call_int(V.words[COMMIT], (context, t, h, a, b))
     if word >= 0 and (switched or word & (Taken.Y_CHANGED + Taken.BEGIN_ANEW)):
         for k in range(len(V.size)):
             V.reason[k] = 0.0
-        cross(V, scene, t, y, switched, V.reason)
+        cross(V, scene, t, y, switched)
         for k in range(len(V.size)):
             if V.reason[k] != 0.0:
                 lose(V, k, t, int(V.reason[k]))
     for k in range(len(V.size)):
+        for s in range(V.memory.shape[1]):
+            for j in range(V.memory.shape[2]):
+                V.before[k, s, j], V.memory[k, s, j] = V.memory[k, s, j], V.end[k, s, j]
         for i in range(n):
             V.kept[k, i] = V.d[k, i]
             V.d[k, i] = V.next[k, i]
@@ -178,16 +191,14 @@ def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int
 
 
 @jitable
-def note_changes(V: Variations, scene: Scene, m: Method, t: float) -> None:
+def note_changes(V: Variations, scene: Scene, t: float) -> None:
     """Find how the end of a step at which a branch changes moves with every parameter."""
-    # of a very short step, as many end at a branch, the polynomial is all rounding
-    H = V.line[0] = SPAN * m.memory[OWN_TIME]
     V.words[STRAIGHT] = 1
     for k in range(len(V.size)):
         if V.lost[k] == math.inf:
-            note_shift(V, scene, t, H, k)
-            if V.words[REMEMBERED] > 0 and abs(V.shift[k]) < math.inf:
-                note_memory(V, scene, t, H, k)
+            note_shifts(V, scene, t, V.line[0], k)
+            if V.words[REMEMBERED] > 0:
+                note_changed(V, scene, t, V.line[0], k)
     V.words[STRAIGHT] = 0
 
 

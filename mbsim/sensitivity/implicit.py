@@ -22,7 +22,7 @@ from mbsim.integrators.radau5 import E as ERROR
 from mbsim.integrators.radau5 import Z as STAGES_AT
 from mbsim.integrators.scheme import FRESH, LAST_STEP, Method, in_workspace
 from mbsim.sensitivity.arrays import JOINTS, REMEMBERED, TWIN, UP, Variations
-from mbsim.sensitivity.twin import half_step, set_parameter
+from mbsim.sensitivity.twin import half_step, keep_change, keep_side, set_parameter
 
 #: Rows of `Variations.stage`: stages less D, F, the right-hand sides and solutions of both systems,
 #: a point and f there.
@@ -75,10 +75,7 @@ def evaluate_stages(
             for i in range(len(m.y)):
                 V.stage[F + j, i] = part * f[i] if side == 0 else V.stage[F + j, i] - part * f[i]
         if V.words[REMEMBERED] > 0:
-            for s in range(V.far.shape[1]):
-                for q in range(V.far.shape[2]):
-                    touches = twin.work.touching[s] == 1
-                    V.far[side, s, q] = twin.work.memory[s, q] if touches else 0.0
+            keep_side(V, twin, scene, side)
     return 0
 
 
@@ -168,9 +165,7 @@ def implicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k:
     if code != 0:
         return code
     if V.words[REMEMBERED] > 0:
-        for s in range(V.far.shape[1]):
-            for j in range(V.far.shape[2]):
-                V.far[0, s, j] = 0.5 / e * (V.far[0, s, j] - V.far[1, s, j])
+        keep_change(V, k, e)
     return 0
 
 

@@ -10,7 +10,9 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
-from mbsim.sensitivity.arrays import REMEMBERED, Variations
+from mbsim.dynamics.contact.forces import BRANCH
+from mbsim.laws.catalog import UNDECIDED
+from mbsim.sensitivity.arrays import ODD, REMEMBERED, Variations
 
 #: Half of the step of differences, in usual sizes of the parameter and of y.
 STEP = 1e-6
@@ -38,6 +40,35 @@ def set_parameter(V: Variations, twin: Scene, scene: Scene, k: int, e: float) ->
             for j in range(state.memory.shape[1]):
                 own.memory[s, j] = state.memory[s, j] + e * V.memory[k, s, j]
                 own.before[s, j] = state.before[s, j] + e * V.before[k, s, j]
+
+
+@jitable
+def is_asked(V: Variations, s: int) -> bool:
+    """Return whether slot s is one of those that change their branch at the end of the step."""
+    for j in range(V.asks[len(V.asks) - 1]):
+        if V.asks[j] == s:
+            return True
+    return False
+
+
+@jitable
+def keep_side(V: Variations, twin: Scene, scene: Scene, side: int) -> None:
+    """Keep what laws make of their memories on one side, and whether one is on another branch."""
+    for s in range(V.far.shape[1]):
+        touches = twin.work.touching[s] == 1
+        for j in range(V.far.shape[2]):
+            V.far[side, s, j] = twin.work.memory[s, j] if touches else 0.0
+        asked, goes_on = twin.work.slot[s, BRANCH], scene.state.touching[s] == 1 and touches
+        if goes_on and asked != UNDECIDED and asked != scene.state.mode[s] and not is_asked(V, s):
+            V.words[ODD] = 1
+
+
+@jitable
+def keep_change(V: Variations, k: int, e: float) -> None:
+    """Keep how what laws remember at the end of the step moves with parameter k."""
+    for s in range(V.far.shape[1]):
+        for j in range(V.far.shape[2]):
+            V.end[k, s, j] = 0.5 / e * (V.far[0, s, j] - V.far[1, s, j])
 
 
 @jitable
