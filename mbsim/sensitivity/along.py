@@ -61,12 +61,13 @@ from mbsim.sensitivity.arrays import (
     CHANGES,
     F_BEFORE,
     MOST_CHANGES,
+    ODD,
     STRAIGHT,
     TWIN,
     UP,
     Variations,
 )
-from mbsim.sensitivity.twin import half_step, set_parameter
+from mbsim.sensitivity.twin import half_step, keep_change, keep_side, set_parameter
 
 #: Rows of `Variations.work`: a point, f on either side, D at a stage, its slopes.
 POINT, UPPER, LOWER, STAGE, FIRST = range(5)
@@ -394,6 +395,27 @@ def project_end(V: Variations, scene: Scene, m: Method, t: float, k: int, e: flo
             return code
     for i in range(V.next.shape[1]):
         V.next[k, i] = 0.5 / e * (w[UPPER, i] - w[LOWER, i])
+    return 0
+
+
+@jitable
+def remember_end(
+    V: Variations, scene: Scene, m: Method, t: float, h: float, k: int, e: float
+) -> int:
+    """Find how what friction keeps at the end of the step moves with parameter k; return a code."""
+    twin, x = view(V.words[TWIN], Scene), V.work[POINT]
+    p = in_workspace(V.words[UP])[0]
+    V.words[ODD] = 0
+    for side in range(2):
+        sign = 1.0 if side == 0 else -1.0
+        set_parameter(V, twin, scene, k, sign * e)
+        for i in range(len(x)):
+            x[i] = m.trial[i] + sign * e * V.next[k, i]
+        code = call_int(p.rhs, (p.context, t + h, h, x, V.work[UPPER]))
+        if code != 0:
+            return code
+        keep_side(V, twin, scene, side)
+    keep_change(V, k, e)
     return 0
 
 

@@ -26,7 +26,14 @@ from mbsim.integrators.scheme import (
     Method,
     in_workspace,
 )
-from mbsim.sensitivity.along import is_bent, list_changes, order_changes, project_end, step_along
+from mbsim.sensitivity.along import (
+    is_bent,
+    list_changes,
+    order_changes,
+    project_end,
+    remember_end,
+    step_along,
+)
 from mbsim.sensitivity.arrays import (
     ASKED,
     ATTEMPT,
@@ -97,6 +104,9 @@ def carry(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) ->
         V.seen[s] = 0
     if V.words[ATTEMPT] == 0:
         code = implicit_step(V, scene, m, t, h, k)
+        if code == Code.NOT_CONVERGED:
+            # with an old linearisation, where forces bend: not so along the motion
+            V.error[k], code = math.inf, 0
     else:
         code = explicit_step(V, scene, m, t, h, k)
     if code != 0:
@@ -117,6 +127,8 @@ def carry(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) ->
     code = step_along(V, scene, m, t, h, k, 1.0)
     if code == 0 and V.words[JOINTS] == 1:
         code = project_end(V, scene, m, t + h, k, half_step(V, k))
+    if code == 0 and V.words[REMEMBERED] > 0:
+        code = remember_end(V, scene, m, t, h, k, half_step(V, k))
     return code
 
 
