@@ -68,7 +68,7 @@ from mbsim.sensitivity.events import (
 )
 from mbsim.sensitivity.explicit import explicit_step, fit_beside
 from mbsim.sensitivity.implicit import implicit_step
-from mbsim.sensitivity.twin import half_step, set_parameter
+from mbsim.sensitivity.twin import half_step, keep_unit, set_parameter
 
 #: Where the packed `Variations` stand: where those of MOREAU would, which takes no part in this.
 AT = Hook.STEPPING
@@ -180,6 +180,8 @@ def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int
     V.shift[:] = math.nan
     list_asking(V, scene, switched)
     take_step(V, scene, m, t - h, h)
+    for k in range(len(V.size)):
+        keep_unit(V.next[k], y, len(scene.bodies.mass))
     if switched:
         note_changes(V, scene, t)
     word = call_int(V.words[COMMIT], (context, t, h, a, b))

@@ -22,7 +22,7 @@ from mbsim.integrators.radau5 import E as ERROR
 from mbsim.integrators.radau5 import Z as STAGES_AT
 from mbsim.integrators.scheme import FRESH, LAST_STEP, Method, in_workspace
 from mbsim.sensitivity.arrays import JOINTS, REMEMBERED, TWIN, UP, Variations
-from mbsim.sensitivity.twin import half_step, keep_change, keep_side, set_parameter
+from mbsim.sensitivity.twin import half_step, keep_change, keep_side, keep_unit, set_parameter
 
 #: Rows of `Variations.stage`: stages less D, F, the right-hand sides and solutions of both systems,
 #: a point and f there.
@@ -138,6 +138,18 @@ def project_stages(
 
 
 @jitable
+def stay_unit(V: Variations, m: Method, k: int, bodies: int) -> None:
+    """Let all stages lead to derivatives of quaternions of unit length, as the run's stages are."""
+    x, d, n = V.stage[POINT], V.stage[SLOPE], len(m.y)
+    for j in range(3):
+        for i in range(n):
+            x[i], d[i] = m.y[i] + m.k[STAGES_AT + j, i], V.d[k, i] + V.stage[Z + j, i]
+        keep_unit(d, x, bodies)
+        for i in range(n):
+            V.stage[Z + j, i] = d[i] - V.d[k, i]
+
+
+@jitable
 def implicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
     """Fill derivative k at the end of the step that is taken; return a code."""
     own = in_workspace(V.words[UP])[0]
@@ -151,6 +163,8 @@ def implicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k:
         code, size, whole = correct(V, own, m, t, h, k)
         if code == 0 and V.words[JOINTS] == 1:
             code = project_stages(V, scene, m, t, h, k, e)
+        else:
+            stay_unit(V, m, k, len(scene.bodies.mass))
         if code != 0:
             return code
         if not size < math.inf:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
+from mbsim.core.layout import BODY_SIZE
 from mbsim.core.memory import floats_at
 from mbsim.dynamics.contact.forces import BRANCH
 from mbsim.laws.catalog import UNDECIDED
@@ -40,6 +41,22 @@ def set_parameter(V: Variations, twin: Scene, scene: Scene, k: int, e: float) ->
             for j in range(state.memory.shape[1]):
                 own.memory[s, j] = state.memory[s, j] + e * V.memory[k, s, j]
                 own.before[s, j] = state.before[s, j] + e * V.before[k, s, j]
+
+
+@jitable
+def keep_unit(d: F1, y: F1, bodies: int) -> None:
+    """Let the derivatives of quaternions be those of unit length, as `project` leaves y.
+
+    A linearised mechanism knows turns alone: of what changes lengths nothing is solved for.
+    """
+    for b in range(bodies):
+        at = BODY_SIZE * b + 3
+        along = size = 0.0
+        for i in range(at, at + 4):
+            along += y[i] * d[i]
+            size += y[i] * y[i]
+        for i in range(at, at + 4):
+            d[i] -= along / size * y[i]
 
 
 @jitable
