@@ -27,7 +27,7 @@ def find_depends(scene: Scene) -> Depends:
     """Return moving bodies and states that each program looks at.
 
     A subroutine may look at anything; its force is taken to depend on the bodies it acts on, its
-    slope of a state on all bodies.
+    slope of a state, and what a system of states puts out, on all bodies.
     """
     programs, nb = scene.programs, len(scene.bodies.mass)
     row_of = {int(offset): z for z, offset in enumerate(scene.states.offset)}
@@ -45,6 +45,8 @@ def find_depends(scene: Scene) -> Depends:
         found = {int(scene.markers.body[m]) for m in markers}
         if calls:
             found |= acts_on.get(k, set())
+            if any(row[0] == p.USER and row[3] == 1 for row in code):
+                found |= set(range(nb))
         bodies.append(sorted(b for b in found if b < nb))
         looked = {row_of[int(row[1])] for row in code if row[0] == p.STATE}
         states.append(sorted(set(row_of.values()) if calls else looked))

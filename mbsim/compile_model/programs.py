@@ -327,7 +327,9 @@ class _Compiler:
             if Kind.VELOCITY not in self.allowed and node.statement != "MOTION":
                 raise ExpressionError("what a user subroutine returns cannot be used here", 1)
             row = self.table.users[node.statement, node.id]
-            return [Instruction(USER, (row, node.component))]
+            # one of several results that are asked for apart, as outputs in forces: it is called
+            calls = int(node.statement == "GSE")
+            return [Instruction(USER, (row, node.component, calls))]
         kind = FUNCTIONS[node.name].kind
         if kind is Kind.VARIABLE:
             return self.variable(node)

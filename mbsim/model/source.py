@@ -29,3 +29,13 @@ class Subroutine:
     interpreter: str = ""
     language: str = ""  # of the library's function: C, FORTRAN, or empty where its name tells
     source: Source = Source()
+
+
+@dataclass(frozen=True)
+class StateSubroutine(Subroutine):
+    """A subroutine that gives the slopes of several states, and outputs (GSESUB)."""
+
+    element_id: int = 0  # of the Control_StateEqn
+    state_ids: tuple[int, ...] = ()  # Control_Diff, in their order
+    input_ids: tuple[int, ...] = ()  # Reference_Variable
+    outputs: int = 0

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from mbsim.forces.catalog import Components, Expressed, of_form
 from mbsim.model.elements import Model
-from mbsim.model.source import Subroutine
+from mbsim.model.source import StateSubroutine, Subroutine
 
 
 class Call(Enum):
@@ -17,6 +17,7 @@ class Call(Enum):
     FORCE = "id, time, par, npar, dflag, iflag"
     PLAIN = "id, time, par, npar, iflag"
     MOTION = "id, time, par, npar, iord, iflag"
+    STATES = "id, time, par, npar, dflag, iflag, nstate, states, ninput, input, noutput"
 
 
 #: Numbers that a REQSUB returns.
@@ -31,8 +32,8 @@ class Wanted(NamedTuple):
     Attributes
     ----------
     kind : str
-        Of `forces.catalog`, or VARIABLE, DIFF, SENSOR, SENVAL (what a sensor evaluates), MOTION,
-        REQUEST: with the id what `expressions.tree.UserResult` names.
+        Of `forces.catalog`, or VARIABLE, DIFF, GSE, SENSOR, SENVAL (what a sensor evaluates),
+        MOTION, REQUEST: with the id what `expressions.tree.UserResult` names.
     statement : str
         The XML's name of the statement.
     id : int
@@ -53,8 +54,11 @@ class Wanted(NamedTuple):
     orders: tuple[int, ...] = ()
 
 
-def asking(each: Wanted) -> tuple[int, ...]:
+def asking(each: Wanted) -> tuple[Any, ...]:
     """Return what stands behind id, time, par, npar in the one call with iflag 1."""
+    if isinstance(each.user, StateSubroutine):
+        n, m = len(each.user.state_ids), len(each.user.input_ids)
+        return (0, 1, n, [0.0] * n, m, [0.0] * m, each.user.outputs)
     return {Call.FORCE: (0, 1), Call.PLAIN: (1,), Call.MOTION: (*each.orders[:1], 1)}[each.call]
 
 
@@ -62,7 +66,7 @@ def calls(each: Wanted) -> tuple[tuple[int, ...], ...]:
     """Return what stands behind id, time, par, npar in the calls for numbers."""
     if each.call is Call.MOTION:
         return tuple((iord, 0) for iord in each.orders)
-    return ((0, 0),) if each.call is Call.FORCE else ((0,),)
+    return ((0,),) if each.call is Call.PLAIN else ((0, 0),)
 
 
 def wanted(model: Model) -> list[Wanted]:
@@ -82,7 +86,7 @@ def _wanted(model: Model) -> Iterator[Wanted]:
             results = sum(expr is not None for expr in vector.exprs)
             yield Wanted(kind.name, kind.statement, vector.id, vector.user, results)
     for state in _with_users(model.differentials):
-        yield Wanted("DIFF", "Control_Diff", state.id, state.user)
+        yield _of_states(state.user) or Wanted("DIFF", "Control_Diff", state.id, state.user)
     for motion in _with_users(model.motions):
         orders = ORDERS[motion.val_type]
         yield Wanted("MOTION", motion.statement, motion.id, motion.user, 3, Call.MOTION, orders)
@@ -93,6 +97,15 @@ def _wanted(model: Model) -> Iterator[Wanted]:
     ):
         for element in _with_users(table):
             yield Wanted(name, statement, element.id, element.user, results, Call.PLAIN)
+
+
+def _of_states(user: Subroutine) -> Wanted | None:
+    """Return a subroutine that gives the slopes of several states, None if it is none."""
+    if not isinstance(user, StateSubroutine):
+        return None
+    results = len(user.state_ids) + user.outputs
+    statement = "Control_StateEqn"
+    return Wanted("GSE", statement, user.element_id, user, results, Call.STATES)
 
 
 def _with_users(table: Mapping[int, Any]) -> list[Any]:

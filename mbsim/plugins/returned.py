@@ -30,6 +30,17 @@ def force_and_state(result: Any, states: int) -> list[float]:
     return three_numbers(force) + numbers(state, states, " of new state")
 
 
+def two_parts(result: Any, first: int, second: int) -> tuple[list[float], list[float]]:
+    """Return slopes of states and outputs that a GSESUB gave, or raise `NotAForce`."""
+    try:
+        slopes, outputs = result
+    except (TypeError, ValueError):
+        shown = repr(result)
+        shown = shown if len(shown) <= 80 else shown[:77] + "..."
+        raise NotAForce(f"returned {shown}, not [stated, output], a list of each") from None
+    return numbers(slopes, first, " of stated"), numbers(outputs, second, " of output")
+
+
 def numbers(result: Any, count: int, names: str = "") -> list[float]:
     """Return a user function's result as `count` finite floats, or raise `NotAForce`."""
     shown = repr(result)

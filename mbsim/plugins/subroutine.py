@@ -16,9 +16,11 @@ import numpy.typing as npt
 
 from mbsim.errors import PluginError
 from mbsim.model.names import element_name, is_adams
+from mbsim.model.source import StateSubroutine
 from mbsim.model.subroutines import Call, Wanted
 from mbsim.plugins import guard
 from mbsim.plugins.helpers import host
+from mbsim.plugins.returned import NotAForce, two_parts
 from mbsim.plugins.source.find import find_either
 from mbsim.plugins.source.native import asks, native
 from mbsim.plugins.source.octave import end_all
@@ -77,15 +79,17 @@ def load_subroutine(
     """
     user, title = each.user, element_name(deck, each.statement, each.id)
     prefix = "ROUTINE" if is_adams(deck) else "usrsub"
+    parts = _parts(each)
     script = find_either(user, user.fnc_name, title, prefix, plugin_files, scripts)
     if isinstance(script, Library):
-        count = 1 if each.call is Call.MOTION else each.results
-        function, how = native(script, user.fnc_name, prefix, user.language, count)
+        function, how = native(script, user.fnc_name, prefix, user.language, *parts)
         looks = asks(script)
     else:
         function = user_function(script, user.fnc_name, title, each.call.value)
         looks, how = script.looks, "interpreted"
     place = user.fnc_name, str(script.path)
+    if isinstance(user, StateSubroutine):
+        function, looks = of_states(function, user), True
     address, keep = guard.state_callback(function, title, place, each)
     looks = looks and each.call is not Call.MOTION
     return UserSubroutine(
@@ -99,6 +103,48 @@ def load_subroutine(
         how,
         keep,
     )
+
+
+def _parts(each: Wanted) -> tuple[int, ...]:
+    """Return how many numbers a subroutine of a library writes, array by array."""
+    if isinstance(each.user, StateSubroutine):
+        return len(each.user.state_ids), each.user.outputs
+    return (1 if each.call is Call.MOTION else each.results,)
+
+
+def of_states(function: Callable[..., Any], user: StateSubroutine) -> Callable[..., Any]:
+    """Return a GSESUB as a function that looks its states and inputs up.
+
+    That is one of (id, time, par, npar, dflag, iflag), which returns slopes, then outputs. Being a
+    function of time, states and inputs, it is called once for the same of these.
+    """
+    n, m = len(user.state_ids), user.outputs
+    kept: list[Any] = [None, []]
+
+    def looked_up(
+        id: int, time: float, par: list[float], npar: int, dflag: int, iflag: int, *_: Any
+    ) -> Any:
+        states = [_known("DIF", state) for state in user.state_ids]
+        inputs = [_known("VARVAL", variable) for variable in user.input_ids]
+        key = (time, iflag, *states, *inputs)
+        if kept[0] != key:
+            result = function(id, time, par, npar, dflag, iflag, n, states, len(inputs), inputs, m)
+            if not iflag:
+                slopes, outputs = two_parts(result, n, m)
+                kept[:] = key, slopes + outputs
+        return kept[1][0] if n + m == 1 and kept[1] else list(kept[1])
+
+    return looked_up
+
+
+def _known(name: str, id: int) -> float:
+    """Return a state or a variable at the state of the call."""
+    value, errflg = host.sysfnc(name, [id])
+    if errflg:
+        raise NotAForce(
+            f"{name}({id}), an input, needs forces or accelerations, which are not known yet"
+        )
+    return float(value)
 
 
 #: Times at which the rates of a motion are tried, how far off the differences for that are taken,

@@ -194,6 +194,9 @@ def _statement(kind: ForceKind) -> Statement:
     for each in reading.attributes if reading else kind.parameters:
         attributes |= _spec(each)
     attributes |= {name: Spec(refused=why) for name, why in kind.refused.items()}
+    if isinstance(kind.form, OfResidual):
+        why = "is of a shared library, which a residual cannot be in"
+        attributes["usrsub_language"] = Spec(refused=why)
     build = _build_own(kind, reading) if reading else _build_marker_force(kind)
     return Statement(kind.statement, attributes, build, about=kind.about)
 

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mbsim.errors import Fault
-from mbsim.expressions.tree import Call, Expression, Node, Number
+from mbsim.expressions.tree import Call, Expression, Node, Number, UserResult
 from mbsim.model import elements as el
-from mbsim.model.source import Source
+from mbsim.model.source import Source, StateSubroutine, Subroutine
 from mbsim.reader.rewriting import Rewriting
 
 if TYPE_CHECKING:
@@ -64,6 +64,7 @@ class LinearSystem:
     scales: tuple[float, ...] = ()
     counts: Mapping[str, int | None] = field(default_factory=dict)  # of x and y, as the deck says
     is_static_hold: bool = False
+    user: Subroutine | None = None  # that gives it in place of matrices
     source: Source = Source()
 
 
@@ -150,8 +151,11 @@ def _expanded(system: LinearSystem, draft: Draft) -> Iterator[tuple[int, list[No
     """Add the states of a system to the draft; yield what the elements of x and y mean."""
     inputs = _inputs(system, draft)
     found = {name: _matrix(system, name, draft) for name in system.matrices}
-    n = found["A"].shape[0] if "A" in found else 0
-    outputs = max((found[name].shape[0] for name in "CD" if name in found), default=0)
+    if system.user is not None:
+        n, outputs = system.counts["x"] or 0, system.counts["y"] or 0
+    else:
+        n = found["A"].shape[0] if "A" in found else 0
+        outputs = max((found[name].shape[0] for name in "CD" if name in found), default=0)
     sizes = {"x": n, "u": len(inputs), "y": outputs}
     for name, rows, columns in _SIZES:
         wanted = (sizes[rows], sizes[columns])
@@ -170,21 +174,46 @@ def _expanded(system: LinearSystem, draft: Draft) -> Iterator[tuple[int, list[No
     starts = _starts(system, n, draft)
     first = max(draft.differentials, default=0) + 1
     states: list[Node] = [_call("DIF", first + k) for k in range(n)]
+    given = _by_user(system, n + outputs)
     for k in range(n):
-        slope = _sum(found, "AB", k, states, inputs)
+        slope = given[k] if given else _sum(found, "AB", k, states, inputs)
         draft.differentials[first + k] = el.Differential(
             id=first + k,
             expr=Expression(f"{system.statement} {system.id}: slope of state {k + 1}", slope),
             ic=starts[k],
             scale=system.scales[k] if system.scales else 1.0,
             is_static_hold=system.is_static_hold,
+            user=_user(system, first, n, outputs, draft) if k == 0 else None,
             label=f"{system.label or system.statement} {system.id} x{k + 1}",
             source=system.source,
         )
     if x := system.arrays.get("x"):
         yield x, states
     if y := system.arrays.get("y"):
-        yield y, [_sum(found, "CD", k, states, inputs) for k in range(outputs)]
+        yield y, given[n:] or [_sum(found, "CD", k, states, inputs) for k in range(outputs)]
+
+
+def _by_user(system: LinearSystem, count: int) -> list[Node]:
+    """Return what a subroutine gives, slopes and then outputs; nothing where there is none."""
+    if system.user is None:
+        return []
+    return [UserResult("GSE", system.id, k) for k in range(count)]
+
+
+def _user(
+    system: LinearSystem, first: int, n: int, outputs: int, draft: Draft
+) -> StateSubroutine | None:
+    """Return the subroutine of a system, which the first of its states keeps."""
+    if system.user is None:
+        return None
+    array = draft.control.arrays.get(system.arrays.get("u") or 0)
+    return StateSubroutine(
+        **vars(system.user),
+        element_id=system.id,
+        state_ids=tuple(range(first, first + n)),
+        input_ids=array.variable_ids if array else (),
+        outputs=outputs,
+    )
 
 
 def _inputs(system: LinearSystem, draft: Draft) -> list[Node]:

@@ -388,6 +388,7 @@ def test_a_residual_without_a_zero_ends_the_run(tmp_path):
         ('j_marker_id="10"', "", "j_marker_id: missing"),
         ('j_marker_id="10"', 'j_marker_id="99"', "j_marker_id"),
         ('script_name="', 'script_name="no/', "no such file"),
+        ('script_name="', 'usrsub_language="C" script_name="', 'usrsub_language="C": is of a'),
     ],
 )
 def test_what_a_deck_may_not_say(old, new, said, tmp_path):

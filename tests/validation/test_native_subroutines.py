@@ -55,6 +55,26 @@ MBSIM_EXPORT void REQSUB(CALLED, int *iflag, double *result)
     for (int k = 0; k < 8; k++) result[k] = k;
     c_sysfnc("ACCX", markers, 1, &result[1], &errflg);
 }
+MBSIM_EXPORT void VFOSUB(CALLED, int *dflag, int *iflag, double *result)
+{
+    int markers[3] = {(int)par[0], (int)par[1], (int)par[1]}, n, errflg;
+    c_sysary("TVEL", markers, 3, result, &n, &errflg);
+    for (int k = 0; k < 3; k++) result[k] *= -0.3;
+}
+MBSIM_EXPORT void VTOSUB(CALLED, int *dflag, int *iflag, double *result)
+{
+    int markers[3] = {(int)par[0], (int)par[1], (int)par[1]}, n, errflg;
+    c_sysary("RVEL", markers, 3, result, &n, &errflg);
+    for (int k = 0; k < 3; k++) result[k] *= -0.3;
+}
+MBSIM_EXPORT void SEVSUB(CALLED, int *iflag, double *result) { *result = par[0] * *time; }
+MBSIM_EXPORT void GSESUB(CALLED, int *dflag, int *iflag, int *nstate, double *states, int *ninput,
+                         double *input, int *noutput, double *stated, double *output)
+{
+    stated[0] = states[1];
+    stated[1] = input[0] - par[0] * states[0];
+    for (int k = 0; k < *noutput; k++) output[k] = (k + 1) * states[0];
+}
 MBSIM_EXPORT void FAILS(CALLED, int *dflag, int *iflag, double *result)
 {
     *result = 0.0;
@@ -87,6 +107,100 @@ subroutine gfosub(id, time, par, npar, dflag, iflag, result)
     call sysary('VEL', int((/par(1), par(2), par(2)/)), 3, v, n, errflg)
     result = -0.3d0 * v
 end subroutine gfosub
+subroutine vfosub(id, time, par, npar, dflag, iflag, result)
+    implicit none
+    integer, intent(in) :: id, npar
+    double precision, intent(in) :: time, par(npar)
+    logical, intent(in) :: dflag, iflag
+    double precision, intent(out) :: result(3)
+    integer :: n
+    logical :: errflg
+    call sysary('TVEL', int((/par(1), par(2), par(2)/)), 3, result, n, errflg)
+    result = -0.3d0 * result
+end subroutine vfosub
+subroutine vtosub(id, time, par, npar, dflag, iflag, result)
+    implicit none
+    integer, intent(in) :: id, npar
+    double precision, intent(in) :: time, par(npar)
+    logical, intent(in) :: dflag, iflag
+    double precision, intent(out) :: result(3)
+    integer :: n
+    logical :: errflg
+    call sysary('RVEL', int((/par(1), par(2), par(2)/)), 3, result, n, errflg)
+    result = -0.3d0 * result
+end subroutine vtosub
+subroutine difsub(id, time, par, npar, dflag, iflag, result)
+    implicit none
+    integer, intent(in) :: id, npar
+    double precision, intent(in) :: time, par(npar)
+    logical, intent(in) :: dflag, iflag
+    double precision, intent(out) :: result
+    logical :: errflg
+    call sysfnc('DIF', (/id/), 1, result, errflg)
+    result = par(1) * result
+end subroutine difsub
+subroutine motsub(id, time, par, npar, iord, iflag, result)
+    implicit none
+    integer, intent(in) :: id, npar, iord
+    double precision, intent(in) :: time, par(npar)
+    logical, intent(in) :: iflag
+    double precision, intent(out) :: result
+    select case (iord)
+    case (0)
+        result = sin(par(1) * time)
+    case (1)
+        result = par(1) * cos(par(1) * time)
+    case default
+        result = -par(1)**2 * sin(par(1) * time)
+    end select
+end subroutine motsub
+subroutine varsub(id, time, par, npar, dflag, iflag, result)
+    implicit none
+    integer, intent(in) :: id, npar
+    double precision, intent(in) :: time, par(npar)
+    logical, intent(in) :: dflag, iflag
+    double precision, intent(out) :: result
+    result = sin(time)
+end subroutine varsub
+subroutine sensub(id, time, par, npar, iflag, result)
+    implicit none
+    integer, intent(in) :: id, npar
+    double precision, intent(in) :: time, par(npar)
+    logical, intent(in) :: iflag
+    double precision, intent(out) :: result
+    result = time
+end subroutine sensub
+subroutine sevsub(id, time, par, npar, iflag, result)
+    implicit none
+    integer, intent(in) :: id, npar
+    double precision, intent(in) :: time, par(npar)
+    logical, intent(in) :: iflag
+    double precision, intent(out) :: result
+    result = par(1) * time
+end subroutine sevsub
+subroutine reqsub(id, time, par, npar, iflag, result)
+    implicit none
+    integer, intent(in) :: id, npar
+    double precision, intent(in) :: time, par(npar)
+    logical, intent(in) :: iflag
+    double precision, intent(out) :: result(8)
+    integer :: k
+    logical :: errflg
+    result = (/(dble(k - 1), k = 1, 8)/)
+    call sysfnc('ACCX', int(par(1:1)), 1, result(2), errflg)
+end subroutine reqsub
+subroutine gsesub(id, time, par, npar, dflag, iflag, nstate, states, ninput, input, noutpt, &
+                  stated, output)
+    implicit none
+    integer, intent(in) :: id, npar, nstate, ninput, noutpt
+    double precision, intent(in) :: time, par(npar), states(nstate), input(ninput)
+    logical, intent(in) :: dflag, iflag
+    double precision, intent(out) :: stated(nstate), output(noutpt)
+    integer :: k
+    stated(1) = states(2)
+    stated(2) = input(1) - par(1) * states(1)
+    output = (/(k * states(1), k = 1, noutpt)/)
+end subroutine gsesub
 """
 BODIES = """
   <Body_Rigid id="1" isground="TRUE"/>
@@ -166,8 +280,43 @@ def test_a_routine_of_an_adams_deck_is_in_c(libraries):
     np.testing.assert_allclose(found["requests/1/F1"], x, atol=1e-7)
 
 
-def test_the_others_in_c(libraries):
-    dll = 'usrsub_dll_name="c"'
+@pytest.mark.parametrize("file", ["c", "f"])
+def test_force_and_torque_apart(file, libraries):
+    model = "".join(
+        f'<Force_Vector_OneBody id="{id}" type="{type}" i_marker_id="20" ref_marker_id="10" '
+        f'usrsub_param_string="USER(20, 10)" usrsub_dll_name="{file}"/>'
+        for id, type in ((2, "ForceOnly"), (3, "TorqueOnly"))
+    )
+    expressed = "<Force_Vector" + EXPRESSED.partition("<Force_Vector")[2]
+    found, expected = run(libraries, model), run(libraries, expressed)
+    for name in ("bodies/2/position", "bodies/2/angular_velocity"):
+        np.testing.assert_allclose(found[name], expected[name], atol=1e-8)
+
+
+@pytest.mark.parametrize("file", ["c", "f"])
+def test_a_system_of_states_and_what_a_sensor_evaluates(file, libraries):
+    dll = f'usrsub_dll_name="{file}"'
+    model = f"""
+  <Reference_Variable id="1" expr="1"/>
+  <Reference_Array id="1" type="U" variable_id="1"/>
+  <Reference_Array id="2" type="X" num_element="2"/>
+  <Reference_Array id="3" type="Y" num_element="2"/>
+  <Control_StateEqn id="4" type="USERSUB" x_array_id="2" y_array_id="3" u_array_id="1" num_state="2"
+    num_output="2" usrsub_param_string="USER(4)" {dll}/>
+  <Sensor_Evaluate id="6" usrsub_param_string="USER(3)" {dll}/>
+  <Sensor_Event id="5" evaluate_id="6" compare="GE" value="0.25" expr="TIME"/>
+  <Post_Request id="1" type="EXPRESSION" expr1="ARYVAL(3,2)" expr2="SENVAL(6)"
+    expr3="ARYVAL(2,2)"/>"""
+    found = run(libraries, model)
+    time = found["time"]
+    np.testing.assert_allclose(found["requests/1/F1"], (1 - np.cos(2 * time)) / 2, atol=1e-7)
+    np.testing.assert_allclose(found["requests/1/F3"], np.sin(2 * time) / 2, atol=1e-7)
+    np.testing.assert_allclose(found["requests/1/F2"][-1], 0.75, atol=0.1)
+
+
+@pytest.mark.parametrize("file", ["c", "f"])
+def test_the_others(file, libraries):
+    dll = f'usrsub_dll_name="{file}"'
     model = f"""
   <Constraint_Joint id="1" type="TRANSLATIONAL" i_marker_id="22" j_marker_id="12"/>
   <Reference_Marker id="12" body_id="1" a00="0" a20="-1" a02="1" a22="0"/>

@@ -104,7 +104,7 @@ def asks(library: Library) -> bool:
 
 
 def native(
-    library: Library, name: str, prefix: str, language: str, results: int
+    library: Library, name: str, prefix: str, language: str, *results: int
 ) -> tuple[Callable[..., Any], str]:
     """Return a function of Python that calls one of a library, and its language.
 
@@ -116,7 +116,7 @@ def native(
     prefix, language : str
         As of `choose`.
     results : int
-        How many numbers it gives; 0 of one that only looks.
+        How many numbers it gives in each array; 0 of one that only looks.
 
     Raises
     ------
@@ -125,23 +125,24 @@ def native(
     """
     spoken, symbol = choose(library, name, prefix, language)
     address = address_of(library, symbol, helpers.host.log)
-    room = (c_double * (results + _SPARE))() if results else None
+    rooms = [(c_double * (count + _SPARE))() for count in results if len(results) > 1 or count]
 
     def call(*given: Any) -> Any:
         arguments = [_argument(each) for each in given]
-        if room is not None:
-            for k in range(results):
+        for room in rooms:
+            for k in range(len(room)):
                 room[k] = math.nan
-            arguments.append(room)
+        arguments += rooms
         entry = ctypes.CFUNCTYPE(None, *[c_void_p] * len(arguments))(address)
         entry(*(ctypes.addressof(each) for each in arguments))
         if _raised:
             error = _raised[0]
             _raised.clear()
             raise error
-        if room is None:
-            return None
-        return room[0] if results == 1 else room[:results]
+        found = [room[:count] for room, count in zip(rooms, results, strict=False)]
+        if len(rooms) != 1:
+            return found or None
+        return found[0][0] if results[0] == 1 else found[0]
 
     return call, spoken
 

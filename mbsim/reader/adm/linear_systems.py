@@ -1,12 +1,13 @@
-"""MATRIX, LSE and TFSISO of an Adams deck: linear control systems."""
+"""MATRIX, LSE, GSE and TFSISO of an Adams deck: linear control systems."""
 
 from __future__ import annotations
 
-from mbsim.reader.adm.declare import ANY, LIST, NUMBERS, AdmStatement
+from mbsim.reader.adm.declare import ANY, LIST, NUMBERS, ROUTINE, AdmStatement
+from mbsim.reader.adm.subroutine import routine
 from mbsim.reader.adm.translate import read_as, written
 from mbsim.reader.control_siso import CONTROL_SISO
 from mbsim.reader.control_state_eqn import CONTROL_STATE_EQN
-from mbsim.reader.kinds import COUNT, FLAG, ID, Kind, keyword
+from mbsim.reader.kinds import COUNT, FLAG, ID, USER, Kind, keyword
 from mbsim.reader.linear_analysis import CONTROL_PLANT_INPUT, CONTROL_PLANT_OUTPUT
 from mbsim.reader.matrix import REFERENCE_MATRIX
 from mbsim.reader.statement import Entry, Spec, Statement
@@ -98,6 +99,44 @@ LSE = AdmStatement(
     },
     build_linear,
     words=_HOLD,
+    xml="Control_StateEqn",
+)
+
+
+def build_general(entry: Entry) -> None:
+    """Add a system by a subroutine, read as the XML's."""
+    user = routine(entry, "GSESUB")
+    if user is None:
+        return
+    fixed = {
+        "usrsub_param_string": f"USER({','.join(map(repr, user.par))})",
+        "usrsub_fnc_name": user.fnc_name,
+    }
+    if user.dll_name:
+        fixed["usrsub_dll_name"] = user.dll_name
+    elif user.script_name:
+        fixed["script_name"] = user.script_name
+    names = _ARRAYS | {"IC": "ic_array_id", "STATIC_HOLD": "is_static_hold"}
+    read_as(entry, CONTROL_STATE_EQN, names | {"NS": "num_state", "NO": "num_output"}, fixed)
+
+
+_DISCRETE = "discrete states are documented but not built yet"
+GSE = AdmStatement(
+    "GSE",
+    {
+        **_ID,
+        "X": Spec(ID, required=True),
+        **{name: Spec(ID) for name in ("U", "Y", "IC")},
+        "NS": Spec(COUNT, required=True),
+        "NO": Spec(COUNT),
+        "FUNCTION": Spec(USER, required=True),
+        "ROUTINE": Spec(ROUTINE),
+        "STATIC_HOLD": Spec(FLAG),
+        "IMPLICIT": Spec(FLAG, refused="implicit equations are not built"),
+        **{name: Spec(ANY, refused=_DISCRETE) for name in ("XD", "ND", "ICD", "SAMPLE_FUNCTION")},
+    },
+    build_general,
+    words=_HOLD | {"IMPLICIT": ("IMPLICIT", "TRUE")},
     xml="Control_StateEqn",
 )
 

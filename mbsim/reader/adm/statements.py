@@ -53,7 +53,7 @@ from mbsim.reader.adm.forces import (
     build_vector,
 )
 from mbsim.reader.adm.friction import FRICTION
-from mbsim.reader.adm.linear_systems import LSE, MATRIX, PINPUT, POUTPUT, TFSISO, VARIABLES
+from mbsim.reader.adm.linear_systems import GSE, LSE, MATRIX, PINPUT, POUTPUT, TFSISO, VARIABLES
 from mbsim.reader.adm.marker_forces import NFORCE, marker_forces
 from mbsim.reader.keywords import fold
 from mbsim.reader.kinds import (
@@ -348,6 +348,7 @@ STATEMENTS = (
         xml="Reference_Array",
     ),
     MATRIX,
+    GSE,
     LSE,
     PINPUT,
     POUTPUT,
