@@ -117,5 +117,5 @@ CONTROL_STATE_EQN = Statement(
         **USERSUB,
     },
     _build_state_eqn,
-    about="a system of inputs, states and outputs, by matrices or a subroutine",
+    about="inputs, states and outputs by matrices or a subroutine",
 )
