@@ -97,7 +97,10 @@ C1, C2, C3, FORM = range(4)
 TURN_LOCKED, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT = range(5)
 
 # kinds of terms: `Equations.kind`
-OFFSET, PERP, ANGLE, DISTANCE, GENERAL, TOUCHING, TWIST, CURVE = range(8)
+OFFSET, PERP, ANGLE, DISTANCE, GENERAL, TOUCHING, TWIST, HIGHER_PAIR = range(8)
+
+# kinds of higher pairs: what is held on what
+POINT_ON_CURVE, CURVE_ON_CURVE, POINT_ON_SURFACE = range(3)
 
 # entries of `Sweep.quality`: when equations were chosen last, the largest of those, and whether
 # the committed state is near a position in which a loop can fold; how far the last step left

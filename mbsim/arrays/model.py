@@ -109,9 +109,10 @@ class Angles(NamedTuple):
 
 @tags.constant
 class Curves(NamedTuple):
-    """Curves on which points of other bodies are held: pieces of degree 5 in a parameter u.
+    """Curves on which points or curves of other bodies stay: pieces of degree 5 in a parameter u.
 
-    On piece k, u from begin[k] on, x = sum_n coefficient[k, n] (u - begin[k])^n in J's axes.
+    On piece k, u from begin[k] on, x = sum_n coefficient[k, n] (u - begin[k])^n in J's axes. Of two
+    curves that touch the first is in I's axes, the row behind it the second, in J's.
     """
 
     first: I1  # (curves + 1,) first piece of each
@@ -119,9 +120,11 @@ class Curves(NamedTuple):
     length: F1  # (pieces,) by how much u grows on it
     coefficient: F3  # (pieces, 6, 3)
     closed: I1  # (curves,) 1 where it goes on at its begin
-    i: I1  # (curves,) markers: whose origin is held, and in whose axes the curve is given
+    i: I1  # (curves,) markers: whose origin or curve is held, and in whose axes the other is given
     j: I1  # (curves,)
-    equation: I1  # (curves,) the first of the two that hold it
+    equation: I1  # (curves,) the first of those that hold it
+    touching: I1  # (curves,) 1 for the first of two that touch, 2 for the second; 0: holds a point
+    normal: F2  # (curves, 3) of the second: unit normal of the plane, in J's axes
 
 
 @tags.constant
@@ -298,10 +301,11 @@ class Equations(NamedTuple):
     kind: I1  # (terms,)
     i: I1  # (terms,) markers
     j: I1  # (terms,)
-    # (terms, 2) of I and of J; of TOUCHING 0 or 1 for x or y, and the slot; of CURVE 0 or 1
+    # (terms, 2) of I and of J; of TOUCHING 0 or 1 for x or y, and the slot; of a higher
+    # pair which of its equations, and its kind
     axis: I2
     factor: F1  # (terms,)
-    angle: I1  # (terms,) row of `Angles`, of CURVE one of `Curves`, -1 for none
+    angle: I1  # (terms,) row of `Angles`, of a higher pair one of `Curves`, -1 for none
     active: tags.State[I1]  # (ne + 1,) equations in use, ascending, their number last
 
 

@@ -52,6 +52,7 @@ _STATEMENTS = {
     "MOTION": "Motion_Joint",
     "GCON": "Constraint_General",
     "PTCV": "Constraint_PTCV",
+    "CVCV": "Constraint_CVCV",
 }
 
 

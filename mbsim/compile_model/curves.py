@@ -1,16 +1,17 @@
-"""Curves of a deck as pieces of polynomials, and where on them points begin."""
+"""Curves of a deck as pieces of polynomials."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from mbsim.arrays.model import Curves
 from mbsim.core.arrays import F1
-from mbsim.model.elements import ParamCurve
+from mbsim.model.curves import ParamCurve
 
 #: Powers of a piece: of degree 5 at most.
 _POWERS = 6
@@ -19,10 +20,15 @@ _SAMPLES = 32
 #: The parameter of a curve goes from the first to the second.
 _BEGIN, _END = -1.0, 1.0
 
+#: A plane's curve is off it by less than this part of its extent.
+_FLAT = 1e-6
+
 Array = np.ndarray
+#: Parameters at which pieces begin, and the end; coefficients of their powers, see `pieces_of`.
+Pieces = tuple[Array, Array]
 
 
-def pieces_of(curve: ParamCurve) -> tuple[Array, Array]:
+def pieces_of(curve: ParamCurve) -> Pieces:
     """Return a curve as pieces.
 
     Through points it is the spline of least degree whose parameter grows with their distances: of
@@ -70,37 +76,62 @@ def pieces_of(curve: ParamCurve) -> tuple[Array, Array]:
     return begin, coefficient
 
 
-def nearest_start(begin: Array, coefficient: Array, point: Array) -> float:
-    """Return the parameter of a curve's point next to another, (3,), as good as samples are."""
-    length = np.diff(begin)
-    part = np.linspace(0.0, 1.0, _SAMPLES, endpoint=False)
-    s = length[:, None] * part
+def samples(pieces: Pieces) -> tuple[Array, Array, Array]:
+    """Return parameters (n,) spread over a curve, its points there and its slopes, (n, 3)."""
+    begin, coefficient = pieces
+    s = np.diff(begin)[:, None] * np.linspace(0.0, 1.0, _SAMPLES, endpoint=False)
     powers = s[..., None] ** np.arange(_POWERS)
     places = np.einsum("ksn,knx->ksx", powers, coefficient)
-    piece, sample = np.unravel_index(
-        np.argmin(np.linalg.norm(places - point, axis=-1)), places.shape[:2]
-    )
-    return float(begin[piece] + s[piece, sample])
+    rising = coefficient[:, 1:] * np.arange(1, _POWERS)[:, None]
+    slopes = np.einsum("ksn,knx->ksx", powers[..., :-1], rising)
+    return (begin[:-1, None] + s).ravel(), places.reshape(-1, 3), slopes.reshape(-1, 3)
+
+
+def nearest_start(pieces: Pieces, point: Array) -> float:
+    """Return the parameter of a curve's point next to another, (3,), as good as samples are."""
+    u, places, _ = samples(pieces)
+    return float(u[np.argmin(np.linalg.norm(places - point, axis=-1))])
+
+
+class Plane(NamedTuple):
+    """The plane of a curve: `normal` (3,) where it has one; a straight line has none."""
+
+    flat: bool  # whether the curve is in a plane
+    normal: Array | None
+
+
+def plane_of(pieces: Pieces) -> Plane:
+    """Return the plane that a curve is in."""
+    _, places, _ = samples(pieces)
+    _, extents, axes = np.linalg.svd(places - places.mean(axis=0), full_matrices=False)
+    if extents[1] <= _FLAT * extents[0]:
+        return Plane(True, None)
+    return Plane(bool(extents[2] <= _FLAT * extents[0]), axes[2])
 
 
 @dataclass
 class CurveTable:
-    """Curves of a model's constraints, one for each, while they are gathered."""
+    """Curves of a model's higher pairs while they are gathered."""
 
-    pieces: list[tuple[Array, Array]] = field(default_factory=list)
+    pieces: list[Pieces] = field(default_factory=list)
     closed: list[bool] = field(default_factory=list)
     markers: list[tuple[int, int]] = field(default_factory=list)
     equation: list[int] = field(default_factory=list)
+    touching: list[int] = field(default_factory=list)
+    normal: list[Array] = field(default_factory=list)
     along: list[float] = field(default_factory=list)
 
-    def add(self, curve: ParamCurve, i: int, j: int, point: Array, equation: int) -> int:
-        """Return the row of a curve in the axes of marker row j; `point` (3,) is near its start."""
-        begin, coefficient = pieces_of(curve)
-        self.pieces.append((begin, coefficient))
+    def add(
+        self, curve: ParamCurve, pieces: Pieces, markers: tuple[int, int], equation: int
+    ) -> int:
+        """Return the row of a curve of the pair of marker rows (i, j): one that holds a point."""
+        self.pieces.append(pieces)
         self.closed.append(curve.is_closed)
-        self.markers.append((i, j))
+        self.markers.append(markers)
         self.equation.append(equation)
-        self.along.append(nearest_start(begin, coefficient, point))
+        self.touching.append(0)
+        self.normal.append(np.zeros(3))
+        self.along.append(0.0)
         return len(self.closed) - 1
 
     def arrays(self) -> tuple[Curves, F1]:
@@ -120,5 +151,7 @@ class CurveTable:
             i=i.copy(),
             j=j.copy(),
             equation=np.array(self.equation, dtype=np.int64),
+            touching=np.array(self.touching, dtype=np.int64),
+            normal=np.array(self.normal, dtype=np.float64).reshape(-1, 3),
         )
         return curves, np.array(self.along, dtype=np.float64)

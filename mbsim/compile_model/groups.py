@@ -24,7 +24,7 @@ from mbsim.model.placement import Placement, graphic_box
 #: Tables of a model whose elements act.
 _ACTING = (
     *("joints", "primitives", "couplers", "motions", "general_constraints"),
-    "points_on_curves",
+    *("points_on_curves", "curves_on_curves"),
     *FORCES,
 )
 #: Where an expression's references lead, by their statement.
@@ -33,6 +33,7 @@ _TABLES = {
     "JPRIM": "primitives",
     "MOTION": "motions",
     "PTCV": "points_on_curves",
+    "CVCV": "curves_on_curves",
     **{name: name for name in FORCES},
     "VARIABLE": "variables",
     "DIFF": "differentials",

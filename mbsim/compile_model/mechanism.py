@@ -17,8 +17,8 @@ import numpy as np
 from mbsim.arrays import codes
 from mbsim.arrays.model import Connections, Curves, Equations, Tree
 from mbsim.arrays.scratch import Sweep
-from mbsim.compile_model.curves import CurveTable
 from mbsim.compile_model.equation_sums import Sums
+from mbsim.compile_model.higher_pairs import add_higher_pairs
 from mbsim.compile_model.markers import MarkerTable
 from mbsim.compile_model.programs import ProgramTable
 from mbsim.compile_model.tree import (
@@ -39,7 +39,6 @@ from mbsim.model.elements import (
     MarkerForce,
     Model,
     Motion,
-    PointOnCurve,
 )
 from mbsim.model.forces import rigid_forces
 from mbsim.model.frames import quaternion
@@ -106,7 +105,6 @@ class _Builder:
         self.model, self.markers, self.programs = model, markers, programs
         self.length = markers.length
         self.sums = Sums()
-        self.curves = CurveTable()
         self.elements: list[tuple[str, int]] = []
         self.pairs: list[tuple[int, int]] = []
         self.tree_joints: dict[int, TreeJoint] = {}
@@ -269,21 +267,6 @@ class _Builder:
             self.sums.terms.append((codes.GENERAL, row, 0, 0, 0, 1.0, -1))
         self.sums.close(connection, "its expression", 0.0, self.length, program, general=1)
 
-    def add_point_on_curve(self, point: PointOnCurve) -> None:
-        """Add a point that stays on a curve: two equations, across it."""
-        i, j = self.markers.row(point.i_marker_id), self.markers.row(point.j_marker_id)
-        connection = self.connect("PTCV", point.id, i, j)
-        p, R = self.markers.frame(j)
-        near, _ = self.markers.frame(i)
-        if point.start is not None:
-            seen_from, axes = self.markers.frame(self.markers.row(point.start_marker_id))
-            near = seen_from + axes @ np.array(point.start)
-        curve, first = self.model.curves[point.curve_id], len(self.sums.program)
-        row = self.curves.add(curve, i, j, R.T @ (near - p), first)
-        for which, name in enumerate(("first offset across the curve", "second offset across it")):
-            self.sums.terms.append((codes.CURVE, i, j, which, 0, 1.0, row))
-            self.sums.close(connection, name, 0.0, self.length)
-
     def add_rigid_force(self, kind: ForceKind, force: MarkerForce) -> None:
         """Add the velocity that a rigid force holds while it sticks; it is no connection."""
         i, j = self.markers.row(force.i_marker_id), self.markers.row(force.j_marker_id)
@@ -429,8 +412,7 @@ def constrain(
         builder.add_motion(motion)
     for constraint in model.general_constraints.values():
         builder.add_general(constraint)
-    for point in model.points_on_curves.values():
-        builder.add_point_on_curve(point)
+    curves = add_higher_pairs(model, markers, builder.sums, builder.connect)
     # friction is held by none of the tree, and its equations are the last
     rigid = rigid_forces(model)
     held = [marker for _, f in rigid for marker in (f.i_marker_id, f.j_marker_id)]
@@ -456,7 +438,7 @@ def constrain(
         connections,
         builder.elements,
         builder.sums.names,
-        *builder.curves.arrays(),
+        *curves.arrays(),
     )
 
 
@@ -493,6 +475,8 @@ def sweep(mechanism: Mechanism) -> Sweep:
         quality=np.zeros(18),
         stress=np.zeros((ne, 6 * len(mechanism.elements))),
         jet=np.zeros(12),
+        pair=np.zeros(3),
+        located=np.zeros(len(mechanism.along)),
         share=np.zeros((nh, nh)),
         mix=np.zeros((nh, nh)),
         cone=np.zeros((codes.CONE_ROWS, nh)),

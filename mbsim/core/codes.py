@@ -29,6 +29,7 @@ class Code(IntEnum):
     STOPPED_BY_USER = 100
     NOT_REPEATED = 101  # f at a point differs each time it is asked for
     END_OF_CURVE = 102  # a point that a curve holds has come to where that ends
+    NO_ONE_TOUCH = 103  # two curves that touch have no one point in which they do
 
 
 #: Codes from here on end the run without another try.

@@ -270,6 +270,7 @@ _element("JOINT", JOINT="reaction of a joint on I (jflag 0) or on J (jflag 1)")
 _element("JPRIM", JPRIM="of a joint primitive")
 _element("MOTION", MOTION="of a motion")
 _element("PTCV", PTCV="of a curve on the point that it holds")
+_element("CVCV", CVCV="of a curve on one that touches it")
 for _name in FORCES:
     _about = f"of a {FORCES[_name].statement}"
     _element(_name, **dict.fromkeys(FORCES[_name].functions.split(), _about))

@@ -1,8 +1,8 @@
-"""Curves in space, and points that stay on them, in the deck's own words and units."""
+"""Curves in space, and what stays on them, in the deck's own words and units."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from mbsim.model.source import Source
 
@@ -40,3 +40,33 @@ class PointOnCurve:
     start_marker_id: int | None = None  # None: global
     label: str = ""
     source: Source = Source()
+
+
+@dataclass(frozen=True)
+class CurveOnCurve:
+    """Constraint_CVCV, Adams' CVCV: a curve in the axes of I touches one in the axes of J.
+
+    `i_start`, `j_start` are near where on each it begins, in the axes of a marker [L]; None: where
+    the curves are next to each other.
+    """
+
+    id: int
+    i_marker_id: int
+    j_marker_id: int
+    i_curve_id: int
+    j_curve_id: int
+    i_start: tuple[float, float, float] | None = None
+    i_start_marker_id: int | None = None
+    j_start: tuple[float, float, float] | None = None
+    j_start_marker_id: int | None = None
+    label: str = ""
+    source: Source = Source()
+
+
+@dataclass(frozen=True, kw_only=True)
+class HigherPairs:
+    """Curves of a model by id, and what stays on them."""
+
+    points_on_curves: dict[int, PointOnCurve] = field(default_factory=dict)
+    curves_on_curves: dict[int, CurveOnCurve] = field(default_factory=dict)
+    curves: dict[int, ParamCurve] = field(default_factory=dict)

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from mbsim.expressions import Expression
 from mbsim.forces.catalog import FORCES
-from mbsim.model.curves import ParamCurve, PointOnCurve
+from mbsim.model.curves import HigherPairs
 from mbsim.model.forces import (
     BodyForce,
     ForceElement,
@@ -54,9 +54,7 @@ __all__ = [
     "MarkerForce",
     "Model",
     "Motion",
-    "ParamCurve",
     "Plant",
-    "PointOnCurve",
     "Request",
     "ScalarForce",
     "Sensor",
@@ -423,7 +421,7 @@ class Request:
 
 
 @dataclass(frozen=True)
-class Model:
+class Model(HigherPairs):
     """A whole deck. Dictionaries are keyed by id, in the order of the deck."""
 
     name: str = field(metadata=NO_RESULT)
@@ -439,7 +437,6 @@ class Model:
     couplers: dict[int, Coupler] = field(default_factory=dict)
     motions: dict[int, Motion] = field(default_factory=dict)
     general_constraints: dict[int, GeneralConstraint] = field(default_factory=dict)
-    points_on_curves: dict[int, PointOnCurve] = field(default_factory=dict)
     scalar_forces: dict[int, ScalarForce] = field(default_factory=dict)
     marker_forces: dict[str, dict[int, MarkerForce]] = field(default_factory=dict)  # by kind
     vector_forces: dict[int, VectorForce] = field(default_factory=dict)
@@ -450,7 +447,6 @@ class Model:
     variables: dict[int, Variable] = field(default_factory=dict)
     differentials: dict[int, Differential] = field(default_factory=dict)
     splines: dict[int, Spline] = field(default_factory=dict)
-    curves: dict[int, ParamCurve] = field(default_factory=dict)
     arrays: dict[int, ArrayOfNumbers] = field(default_factory=dict)
     sensors: dict[int, Sensor] = field(default_factory=dict)
     evaluations: dict[int, Evaluation] = field(default_factory=dict)

@@ -20,6 +20,7 @@ STATEMENTS = {
     "JPRIM": "Constraint_Jprim",
     "MOTION": "Motion_Joint",
     "PTCV": "Constraint_PTCV",
+    "CVCV": "Constraint_CVCV",
     **{name: FORCES[name].statement for name in FORCES},
     "CONTACT": "Force_Contact",
     "VARIABLE": "Reference_Variable",
@@ -44,6 +45,8 @@ _MARKERS = (
     "j_floating_marker_id",
     "ref_marker_id",
     "start_marker_id",
+    "i_start_marker_id",
+    "j_start_marker_id",
 )
 
 Wanted = tuple[Source, str, str, int | None, str]
@@ -58,6 +61,7 @@ def tables(model: Model) -> dict[str, Mapping[int, Any]]:
         "Constraint_Coupler": model.couplers,
         "Constraint_General": model.general_constraints,
         "Constraint_PTCV": model.points_on_curves,
+        "Constraint_CVCV": model.curves_on_curves,
         "Motion_Joint": model.motions,
         **{FORCES[name].statement: model.table(name) for name in FORCES},
         "Reference_Variable": model.variables,
@@ -89,9 +93,15 @@ def wanted(model: Model) -> Iterator[Wanted]:
                 yield element.source, name, "joint_id", element.joint_id or None, "Constraint_Joint"
             for id in getattr(element, "joint_ids", ()):
                 yield element.source, name, "joint_ids", id, "Constraint_Joint"
-    for point in model.points_on_curves.values():
-        name = f"Constraint_PTCV[{point.id}]"
-        yield point.source, name, "curve_id", point.curve_id or None, "Reference_ParamCurve"
+    for statement, pairs, attributes in (
+        ("Constraint_PTCV", model.points_on_curves, ("curve_id",)),
+        ("Constraint_CVCV", model.curves_on_curves, ("i_curve_id", "j_curve_id")),
+    ):
+        for pair in pairs.values():
+            for attribute in attributes:
+                id = getattr(pair, attribute) or None
+                name = f"{statement}[{pair.id}]"
+                yield pair.source, name, attribute, id, "Reference_ParamCurve"
     for request in model.requests.values():
         if request.elem_type and request.elem_id:
             statement = STATEMENTS[request.elem_type]

@@ -15,6 +15,7 @@ ADAMS = {
     "Constraint_General": "GCON",
     "Constraint_Coupler": "COUPLER",
     "Constraint_PTCV": "PTCV",
+    "Constraint_CVCV": "CVCV",
     "Post_Graphic": "GRAPHICS",
     "Force_Contact": "CONTACT",
     "Force_JointFriction": "FRICTION",

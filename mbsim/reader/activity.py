@@ -24,6 +24,7 @@ _TABLES: Mapping[str, tuple[str, ...]] = {
     "FRICTION": ("JOINTFRICTION",),
     "GCON": ("general_constraints",),
     "PTCV": ("points_on_curves",),
+    "CVCV": ("curves_on_curves",),
     "GFORCE": ("VECTORFORCE", "BODYFORCE"),
     "JOINT": ("joints",),
     "JPRIM": ("primitives",),
@@ -42,6 +43,7 @@ _STATEMENTS = {
     "couplers": "Constraint_Coupler",
     "general_constraints": "Constraint_General",
     "points_on_curves": "Constraint_PTCV",
+    "curves_on_curves": "Constraint_CVCV",
     "joints": "Constraint_Joint",
     "primitives": "Constraint_Jprim",
     "motions": "Motion_Joint",
@@ -50,7 +52,7 @@ _STATEMENTS = {
 TYPES = spellings(**dict.fromkeys(_TABLES, ""))
 TYPES_NOT_BUILT = spellings(
     **dict.fromkeys(
-        "CVCV CVSF DIFF GEAR GSE LSE MATE MFORCE PFORCE PTDCV PTDSF PTDSFF PTSF SFSF "
+        "CVSF DIFF GEAR GSE LSE MATE MFORCE PFORCE PTDCV PTDSF PTDSFF PTSF SFSF "
         "TFSISO UCON YFORCE".split(),
         "",
     )

@@ -1,4 +1,4 @@
-"""Reference_ParamCurve and Constraint_PTCV: curves in space, and points that stay on them."""
+"""Reference_ParamCurve, Constraint_PTCV, Constraint_CVCV: curves, and what stays on them."""
 
 from __future__ import annotations
 
@@ -8,13 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from mbsim.errors import Fault
-from mbsim.model import elements as el
+from mbsim.model.curves import CurveOnCurve, ParamCurve, PointOnCurve
 from mbsim.reader.draft import Draft
 from mbsim.reader.kinds import COUNT, FLAG, ID, REAL, REALS, TEXT
 from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 from mbsim.reader.subroutine import USERSUB
 
 _START = ("disp_x0", "disp_y0", "disp_z0")
+_START_I = ("i_disp_x0", "i_disp_y0", "i_disp_z0")
+_START_J = ("j_disp_x0", "j_disp_y0", "j_disp_z0")
 #: Points that lie nearer to each other than this part of the curve's extent are one.
 _APART = 1e-9
 
@@ -32,7 +34,7 @@ def _build_curve(entry: Entry) -> None:
         wanted = "rows of x, y and z" if count is None else f"{count} rows of x, y and z"
         entry.fault(f"must be {wanted}; there are {len(numbers)} numbers", by[0])
         return
-    curve = el.ParamCurve(
+    curve = ParamCurve(
         id=entry.get("id", 0),
         points=tuple(zip(numbers[::3], numbers[1::3], numbers[2::3], strict=True)),
         is_closed=entry.get("is_u_closed", False),
@@ -50,7 +52,7 @@ def _build_curve(entry: Entry) -> None:
         entry.draft.curve_matrices[curve.id] = entry.get("matrix_id")
 
 
-def fault_of_points(curve: el.ParamCurve) -> str:
+def fault_of_points(curve: ParamCurve) -> str:
     """Return why points make no curve, or an empty string."""
     points = np.array(curve.points).reshape(-1, 3)
     least = curve.degree + 1
@@ -85,22 +87,51 @@ def complete_curves(draft: Draft) -> Iterator[Fault]:
             )
 
 
+def _start(entry: Entry, names: tuple[str, str, str]) -> tuple[float, float, float] | None:
+    """Return near where on a curve a pair begins, None where it is not given."""
+    given, (x, y, z) = entry.those(names), names
+    if given and len(given) < 3:
+        entry.fault(f"must be given with {x}, {y} and {z}, or not at all", given[0])
+        return None
+    return (entry.get(x, 0.0), entry.get(y, 0.0), entry.get(z, 0.0)) if given else None
+
+
 def _build_point(entry: Entry) -> None:
     """Add a point on a curve."""
-    given = entry.those(_START)
-    if given and len(given) < 3:
-        entry.fault("must be given with disp_x0, disp_y0 and disp_z0, or not at all", given[0])
-        return
-    point = el.PointOnCurve(
+    point = PointOnCurve(
         id=entry.get("id", 0),
         i_marker_id=entry.get("i_marker_id", 0),
         j_marker_id=entry.get("j_marker_id", 0),
         curve_id=entry.get("curve_id", 0),
-        start=tuple(entry.get(name, 0.0) for name in _START) if given else None,
+        start=_start(entry, _START),
         label=entry.get("label", ""),
         source=entry.source,
     )
     entry.register(entry.draft.points_on_curves, point)
+
+
+def _build_touching(entry: Entry) -> None:
+    """Add a curve that touches a curve."""
+    if entry.get("is_no_slip", False):
+        entry.fault(
+            "curves that roll without slip are not built; FALSE lets them slide", "is_no_slip"
+        )
+        return
+    i, j = entry.get("i_marker_id", 0), entry.get("j_marker_id", 0)
+    pair = CurveOnCurve(
+        id=entry.get("id", 0),
+        i_marker_id=i,
+        j_marker_id=j,
+        i_curve_id=entry.get("i_curve_id", 0),
+        j_curve_id=entry.get("j_curve_id", 0),
+        i_start=_start(entry, _START_I),
+        i_start_marker_id=i,
+        j_start=_start(entry, _START_J),
+        j_start_marker_id=j,
+        label=entry.get("label", ""),
+        source=entry.source,
+    )
+    entry.register(entry.draft.curves_on_curves, pair)
 
 
 _SUBROUTINE = "CURSUB is documented but not built yet; give points or matrix_id"
@@ -137,4 +168,28 @@ CONSTRAINT_PTCV = Statement(
     },
     _build_point,
     about="a point that stays on a curve",
+)
+_NO_VELOCITY = "velocities at the start are those of the bodies"
+CONSTRAINT_CVCV = Statement(
+    "Constraint_CVCV",
+    {
+        **NAMED,
+        "i_marker_id": Spec(ID, "marker in whose axes the first curve is given", required=True),
+        "i_curve_id": Spec(ID, "the first Reference_ParamCurve, in a plane", required=True),
+        **{
+            name: Spec(REAL, "near where on it the curves touch, in the axes of I", "L", "found")
+            for name in _START_I
+        },
+        "i_vel0": Spec(REAL, note=_NO_VELOCITY),
+        "j_marker_id": Spec(ID, "marker in whose axes the second curve is given", required=True),
+        "j_curve_id": Spec(ID, "the second, in a plane", required=True),
+        **{
+            name: Spec(REAL, "near where on it the curves touch, in the axes of J", "L", "found")
+            for name in _START_J
+        },
+        "j_vel0": Spec(REAL, note=_NO_VELOCITY),
+        "is_no_slip": Spec(FLAG, "must be FALSE: the curves slide on each other", "", "FALSE"),
+    },
+    _build_touching,
+    about="a curve that touches a curve",
 )

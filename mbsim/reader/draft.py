@@ -7,6 +7,7 @@ from pathlib import Path
 
 from mbsim.errors import Fault
 from mbsim.model import elements as el
+from mbsim.model.curves import CurveOnCurve, ParamCurve, PointOnCurve
 from mbsim.reader.linear_systems import ControlDraft
 from mbsim.reader.parse import Node
 
@@ -56,7 +57,8 @@ class Draft:
     gears: dict[int, GearDraft] = field(default_factory=dict)
     motions: dict[int, el.Motion] = field(default_factory=dict)
     general_constraints: dict[int, el.GeneralConstraint] = field(default_factory=dict)
-    points_on_curves: dict[int, el.PointOnCurve] = field(default_factory=dict)
+    points_on_curves: dict[int, PointOnCurve] = field(default_factory=dict)
+    curves_on_curves: dict[int, CurveOnCurve] = field(default_factory=dict)
     scalar_forces: dict[int, el.ScalarForce] = field(default_factory=dict)
     marker_forces: dict[str, dict[int, el.MarkerForce]] = field(default_factory=dict)
     multi_points: dict[int, MultiPointDraft] = field(default_factory=dict)
@@ -70,7 +72,7 @@ class Draft:
     evaluations: dict[int, el.Evaluation] = field(default_factory=dict)
     differentials: dict[int, el.Differential] = field(default_factory=dict)
     splines: dict[int, el.Spline] = field(default_factory=dict)
-    curves: dict[int, el.ParamCurve] = field(default_factory=dict)
+    curves: dict[int, ParamCurve] = field(default_factory=dict)
     curve_matrices: dict[int, int] = field(default_factory=dict)  # of curves that these give
     arrays: dict[int, el.ArrayOfNumbers] = field(default_factory=dict)
     control: ControlDraft = field(default_factory=ControlDraft)

@@ -66,6 +66,7 @@ FORCE_ELEMENTS = spellings(
     JPRIM="CONSTRAINT_JPRIM",
     MOTION="MOTION_JOINT MOTION_MARKER",
     PTCV="CONSTRAINT_PTCV",
+    CVCV="CONSTRAINT_CVCV",
     **{name: f"{kind.statement} {kind.spellings}" for name in FORCES if (kind := FORCES[name])},
     CONTACT="FORCE_CONTACT",
 )

@@ -18,7 +18,7 @@ from mbsim.reader.contact import FORCE_CONTACT
 from mbsim.reader.control_siso import CONTROL_SISO
 from mbsim.reader.control_state_eqn import CONTROL_STATE_EQN
 from mbsim.reader.controls import CONTROL_DIFF, SENSOR_EVALUATE, SENSOR_EVENT
-from mbsim.reader.curves import CONSTRAINT_PTCV, REFERENCE_PARAM_CURVE
+from mbsim.reader.curves import CONSTRAINT_CVCV, CONSTRAINT_PTCV, REFERENCE_PARAM_CURVE
 from mbsim.reader.draft import Draft
 from mbsim.reader.forces import force_statements
 from mbsim.reader.gears import CONSTRAINT_GEAR
@@ -57,6 +57,7 @@ STATEMENTS = (
     CONSTRAINT_COUPLER,
     CONSTRAINT_GENERAL,
     CONSTRAINT_PTCV,
+    CONSTRAINT_CVCV,
     CONSTRAINT_GEAR,
     MOTION_JOINT,
     MOTION_MARKER,

@@ -34,11 +34,12 @@ GROUPS = {
         "general_constraints", "general_constraints", "general constraint", "Constraint_General"
     ),
     "PTCV": Group("points_on_curves", "points_on_curves", "point on a curve", "Constraint_PTCV"),
+    "CVCV": Group("curves_on_curves", "curves_on_curves", "curve on a curve", "Constraint_CVCV"),
     **{name: Group(name, k.path, k.title, k.statement) for name in FORCES if (k := FORCES[name])},
     "CONTACT": Group("contacts", "contacts", "contact", "Force_Contact"),
 }
 #: Those that hold degrees of freedom, then those that push.
-CONSTRAINTS = ("JOINT", "JPRIM", "COUPLER", "MOTION", "GCON", "PTCV")
+CONSTRAINTS = ("JOINT", "JPRIM", "COUPLER", "MOTION", "GCON", "PTCV", "CVCV")
 APPLIED = tuple(FORCES)
 
 
@@ -88,5 +89,5 @@ def equations(model: Model) -> int:
         len(JOINTS[joint.type].equations)
         for joint in (*model.joints.values(), *model.primitives.values())
     )
-    held += 2 * len(model.points_on_curves)
+    held += 2 * len(model.points_on_curves) + 3 * len(model.curves_on_curves)
     return held + len(model.couplers) + len(model.motions) + len(model.general_constraints)

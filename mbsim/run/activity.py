@@ -36,6 +36,7 @@ CONNECTIONS = {
     "MOTION": "motions",
     "GCON": "general_constraints",
     "PTCV": "points_on_curves",
+    "CVCV": "curves_on_curves",
 }
 _OF_APPLIED = ("form", "program", "components", "connection", "law", "by_reactions")
 _OF_SENSORS = ("program", "compare", "value", "located")

@@ -151,6 +151,8 @@ def fail(system: System, detector: Any, code: int, t: float) -> NoReturn:
         raise PluginError(f"Force_Contact[{element}]: its subroutine failed at time {t:.12g}")
     if code == Code.END_OF_CURVE:
         raise SolverError(_at_end(system, t))
+    if code == Code.NO_ONE_TOUCH:
+        raise SolverError(_touches_nowhere(system, t))
     if code == Code.NOT_REPEATED:
         raise SolverError(_not_repeated(system, t))
     if code == Code.DETECTOR_FAILED and detector is not None:
@@ -221,15 +223,28 @@ def _unsolved(system: System, t: float) -> str:
 
 
 def _at_end(system: System, t: float) -> str:
-    """Return which point has come to the end of its curve."""
-    scene, held = system.scene, [k for k, (s, _) in enumerate(system.connections) if s == "PTCV"]
+    """Return which higher pair has come to the end of a curve."""
+    scene = system.scene
     curves, along = scene.curves, scene.state.along
     last = curves.first[1:] - 1
     out = (along < curves.begin[curves.first[:-1]]) | (
         along > curves.begin[last] + curves.length[last]
     )
-    row = int(np.flatnonzero(out & (curves.closed == 0))[0])
+    holds = (curves.closed == 0) & (scene.equations.off[curves.equation] == 0)
+    row = int(np.flatnonzero(out & holds)[0])
+    pair = int(scene.equations.connection[curves.equation[row]])
+    curve = ("its curve", "the curve of I", "the curve of J")[curves.touching[row]]
     return (
-        f"{system.connection_name(held[row])} comes to an end of its curve at time {t:.9g} and has "
+        f"{system.connection_name(pair)} comes to an end of {curve} at time {t:.9g} and has "
         "nowhere to go; results up to there are kept"
+    )
+
+
+def _touches_nowhere(system: System, t: float) -> str:
+    """Return that curves that touch have no one point in which they do."""
+    pairs = [k for k, (statement, _) in enumerate(system.connections) if statement == "CVCV"]
+    names = " or ".join(map(system.connection_name, pairs))
+    return (
+        f"{names}: the curves have no one point of contact at time {t:.9g}: none is found next to "
+        "the last one, or both are equally bent there; results up to there are kept"
     )

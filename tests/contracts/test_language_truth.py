@@ -31,6 +31,7 @@ from mbsim.expressions.functions import FUNCTIONS, Kind
 from mbsim.expressions.parse import parse
 from mbsim.forces.catalog import FORCES as KINDS
 from mbsim.model import elements as el
+from mbsim.model.curves import CurveOnCurve, ParamCurve, PointOnCurve
 
 POINTS = 1000
 #: Of these, plain Python takes the first where it would take long.
@@ -404,6 +405,7 @@ PUSHES = {
     ("JPRIM", 7): (22, 31),
     ("MOTION", 8): (31, 22),
     ("PTCV", 9): (22, 32),
+    ("CVCV", 10): (32, 21),
 }
 ALONE, FLOATING = {("SFORCE", 3)}, {("VECTORFORCE", 5)}
 FORCES = {
@@ -418,9 +420,11 @@ FORCES = {
     "joints": [el.Joint(6, "SPHERICAL", "", 32, 22)],
     "primitives": [el.Joint(7, "INPLANE", "", 22, 31, is_primitive=True)],
     "motions": [el.Motion(8, "", None, 31, 22, "X", expr=parse("TIME"))],
-    "points_on_curves": [el.PointOnCurve(9, 22, 32, 1)],
+    "points_on_curves": [PointOnCurve(9, 22, 32, 1)],
+    "curves_on_curves": [CurveOnCurve(10, 32, 21, 2, 2)],
     "curves": [
-        el.ParamCurve(1, ((0.0, 0.0, 0.0), (1.0, 0.2, 0.0), (2.0, 0.0, 1.0), (3.0, 0.0, 0.0)))
+        ParamCurve(1, ((0.0, 0.0, 0.0), (1.0, 0.2, 0.0), (2.0, 0.0, 1.0), (3.0, 0.0, 0.0))),
+        ParamCurve(2, ((0.0, 0.0, 0.0), (1.0, 1.0, 0.0), (2.0, 4.0, 0.0), (3.0, 9.0, 0.0))),
     ],
 }
 NET_NAMES = ("FM", "FX", "FY", "FZ", "TM", "TX", "TY", "TZ")

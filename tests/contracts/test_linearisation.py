@@ -237,6 +237,15 @@ def test_several_on_one_body(tmp_path):
 
 
 #: What holds beside joint 1 (of body 1 on ground) and joint 2 (of body 2 on body 1).
+def parabola(id, body, bent, tilt):
+    """Return a parabola through (1.3, -0.2, -0.1) along y, tilted about it, in a body's axes."""
+    along = np.linspace(-0.8, 0.8, 9)
+    points = np.column_stack([bent * along**2, along, 0.0 * along]) @ rotation((0, 1, 0), tilt).T
+    points = (points + np.array([1.3, -0.2, -0.1]) - np.array(body.p)) @ np.array(body.R)
+    text = " ".join(f"{v!r}" for v in points.ravel().tolist())
+    return f'<Reference_ParamCurve id="{id}">{text}</Reference_ParamCurve>'
+
+
 EQUATIONS = {
     "turned": (
         "REVOLUTE",
@@ -300,6 +309,13 @@ EQUATIONS = {
         '<Reference_ParamCurve id="7">1 -0.6 -0.1 1.3 -0.3 -0.35 1.55 -0.15 -0.3 1.7 0.2 -0.1 '
         "1.7 0.5 0.2</Reference_ParamCurve>"
         '<Constraint_PTCV id="1" i_marker_id="102" j_marker_id="100" curve_id="7"/>',
+    ),
+    "a curve on a curve": (
+        "SPHERICAL",
+        parabola(7, FIRST, 0.4, 0.0)
+        + parabola(8, SECOND, 1.3, 0.3)
+        + '<Constraint_CVCV id="1" i_marker_id="102" i_curve_id="8" j_marker_id="101" '
+        'j_curve_id="7"/>',
     ),
     "general on two": ("SPHERICAL", '<Constraint_General id="1" expr="DX(102,101,101) - 1"/>'),
 }

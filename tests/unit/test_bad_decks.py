@@ -276,9 +276,9 @@ BROKEN: dict[str, tuple[str, int, tuple[str, ...]]] = {
     ),
     # documented, not built
     "gear": (
-        added('<Constraint_CVCV id="1"/>'),
+        added('<Constraint_PTdCV id="1"/>'),
         END_OF_MODEL,
-        ("Constraint_CVCV[1]", "not built yet"),
+        ("Constraint_PTdCV[1]", "not built yet"),
     ),
     "spring": (added('<Force_SpringDamper id="1"/>'), END_OF_MODEL, ("Force_SpringDamper[1]",)),
     "sensor": (

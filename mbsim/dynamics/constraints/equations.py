@@ -21,9 +21,9 @@ from mbsim.arrays.codes import (
     ASKED,
     AXIS_I,
     AXIS_J,
-    CURVE,
     FOLD_POWER,
     GENERAL,
+    HIGHER_PAIR,
     KEPT,
     KEPT_PIVOT,
     OFFSET,
@@ -43,7 +43,6 @@ from mbsim.dynamics.constraints.folding import SAMPLED, is_sticking, near_fold, 
 from mbsim.dynamics.constraints.in_use import active_count, is_friction
 from mbsim.dynamics.constraints.terms import (
     angle_term,
-    curve_term,
     distance_term,
     general_term,
     offset_term,
@@ -62,8 +61,22 @@ NAUGHT = 1e-8
 
 
 @jitable
+def higher_pair_of(scene: Scene, e: int) -> int:
+    """Return the first term of the higher pair that equation e is of, -1 for none."""
+    k = scene.equations.first[e]
+    first = k - scene.equations.axis[k, AXIS_I]
+    return first if scene.equations.kind[k] == HIGHER_PAIR else -1
+
+
+@jitable
 def fill_equation(scene: Scene, t: float, y: F1, e: int) -> None:
     """Fill gradient, residual and rates of equation e."""
+    fill_terms(scene, t, y, e, 1)
+
+
+@jitable
+def fill_terms(scene: Scene, t: float, y: F1, e: int, anew: int) -> None:
+    """Do the same; with `anew` 0 a higher pair touches where its equation before this found."""
     eq, sweep = scene.equations, scene.sweep
     value, flow, second = -eq.constant[e], 0.0, 0.0
     for k in range(eq.first[e], eq.first[e + 1]):
@@ -84,8 +97,9 @@ def fill_equation(scene: Scene, t: float, y: F1, e: int) -> None:
             g, dg, ddg = angle_term(scene, y, i, j, eq.angle[k], G)
         elif kind == TWIST:
             g, dg, ddg = twist_term(scene, y, i, j, G)
-        elif kind == CURVE:
-            g, dg, ddg = curve_term(scene, y, i, j, eq.angle[k], eq.axis[k, AXIS_I], G)
+        elif kind == HIGHER_PAIR:
+            call_int(scene.world.hooks[Hook.HIGHER_PAIRS], (scene, k, anew, y))
+            g, dg, ddg = sweep.pair[0], sweep.pair[1], sweep.pair[2]
         else:
             g, dg, ddg = distance_term(scene, y, i, j, G)
         value += factor * g
@@ -122,8 +136,12 @@ def fill_equations(scene: Scene, t: float, y: F1) -> None:
     """Fill gradient, residual and rates of the equations in use."""
     if scene.world.hooks[Hook.STICKING] != 0:
         answer_of(scene, call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.LOCATE, t, y)))
+    before = -1
     for r in range(active_count(scene)):
-        fill_equation(scene, t, y, scene.equations.active[r])
+        e = scene.equations.active[r]
+        pair = higher_pair_of(scene, e)
+        fill_terms(scene, t, y, e, 0 if pair >= 0 and pair == before else 1)
+        before = pair
 
 
 @jitable

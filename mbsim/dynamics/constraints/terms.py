@@ -10,7 +10,6 @@ from mbsim.core.arrays import F1, V2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, scale, sub, vector
 from mbsim.dynamics.bodies.angles import followed_angle
-from mbsim.dynamics.bodies.curves import across, curve_point, nearest_parameter, seen_from
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.bodies.markers import (
     marker_arm,
@@ -151,29 +150,6 @@ def distance_term(scene: Scene, y: F1, i: int, j: int, G: F1) -> V3:
     if length > 0.0:
         second += (dot(v, v) - along * along) / length
     return length, along, second
-
-
-@jitable
-def curve_term(scene: Scene, y: F1, i: int, j: int, c: int, which: int, G: F1) -> V3:
-    """Return value, rate and second rate of how far I is off a curve, and fill its gradient.
-
-    With d the point as seen from J, x(u) the nearest one of the curve, n at right angles to x':
-
-        n . (d - x), and where that is 0: n . d', n . d'' - u'^2 n . x'',  u' = x' . d'/(x' . x').
-    """
-    d = seen_from(scene, y, c)
-    x, dx, ddx = curve_point(scene, c, nearest_parameter(scene, c, d))
-    n = across(scene, c, dx, which)
-    e, along = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    for k in range(3):
-        axis = marker_axis(scene, j, k)
-        e, along = add(e, scale(n[k], axis)), add(along, scale(dx[k], axis))
-    _, flow, second = along_term(scene, y, i, j, e, G)
-    v = sub(marker_velocity(scene, i), marker_velocity(scene, j))
-    w = vector(scene.work.w[scene.markers.body[j]])
-    arm = sub(marker_point(scene, y, i), marker_point(scene, y, j))
-    rate = dot(along, sub(v, cross(w, arm))) / dot(dx, dx)
-    return dot(n, sub(d, x)), flow, second - rate * rate * dot(n, ddx)
 
 
 @jitable

@@ -9,7 +9,6 @@ from mbsim.core.address import call_float, vector_at, view
 from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.angles import commit_angles, longest_turn
-from mbsim.dynamics.bodies.curves import commit_curves
 from mbsim.dynamics.expressions.interpreter import interpret
 from mbsim.dynamics.expressions.jets import fill_values
 from mbsim.dynamics.expressions.states import add_slopes
@@ -21,6 +20,7 @@ from mbsim.dynamics.forces.joint_friction import add_friction
 from mbsim.dynamics.forces.multi_point import add_any_wrench
 from mbsim.dynamics.forces.reaction_forces import add_reaction_forces
 from mbsim.dynamics.forces.wrenches import add_marker_force, add_vector_force, add_wrench
+from mbsim.dynamics.higher_pairs.serve import commit_pairs, fill_pair
 from mbsim.dynamics.stiction.rigid_contact import serve_sticking
 from mbsim.dynamics.stiction.rigid_friction import serve_rigid
 
@@ -110,10 +110,17 @@ def commit_turns(context: int, y: Pointer) -> int:
 
 
 def commit_ways(context: int, y: Pointer) -> int:
-    """The same, and where points are on their curves."""
+    """The same, and where higher pairs touch."""
     scene = view(context, Scene)
     commit_angles(scene)
-    return commit_curves(scene, vector_at(y, scene.rows.y.shape[1]))
+    return commit_pairs(scene, vector_at(y, scene.rows.y.shape[1]))
+
+
+def fill_higher_pair(context: int, k: int, anew: int, y: Pointer) -> int:
+    """A term of an equation of a higher pair."""
+    scene = view(context, Scene)
+    fill_pair(scene, k, anew, vector_at(y, scene.rows.y.shape[1]))
+    return 0
 
 
 def serve_dry_alone(context: int, what: int, t: float, y: Pointer) -> int:

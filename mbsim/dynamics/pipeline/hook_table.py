@@ -81,6 +81,11 @@ def _any(table: str, column: str) -> Callable[[Scene, Method], bool]:
     return lambda scene, method: bool(np.any(getattr(getattr(scene, table), column)))
 
 
+def _rows(table: str, column: str) -> Callable[[Scene, Method], bool]:
+    """Return what says whether a scene's table has rows."""
+    return lambda scene, method: len(getattr(getattr(scene, table), column)) > 0
+
+
 def _gauges(scene: Scene) -> Callable[..., Any]:
     from mbsim.dynamics.pipeline.contact_hooks import gauge_contacts, gauge_steps
 
@@ -151,10 +156,6 @@ def _wrench(scene: Scene) -> Callable[..., Any]:
     return of.act_by_vector_force
 
 
-def _has_joints(scene: Scene, method: Method) -> bool:
-    return len(scene.tree.body) > 0
-
-
 def _joints(scene: Scene) -> Callable[..., Any]:
     """Return what joints do; a tree alone compiles no equations."""
     from mbsim.dynamics.pipeline.joint_hooks import serve_joints, serve_tree
@@ -172,10 +173,6 @@ def _reaction_forces(scene: Scene) -> Callable[..., Any]:
 
     # forces by reactions are compiled with all that they need
     return settle if len(scene.applied.by_reactions) > 0 else add_joint_friction
-
-
-def _always(scene: Scene, method: Method) -> bool:
-    return True
 
 
 def _has_equations(scene: Scene, method: Method) -> bool:
@@ -228,14 +225,6 @@ def _dry(scene: Scene) -> Callable[..., Any]:
 
 def _has_ways(scene: Scene, method: Method) -> bool:
     return len(scene.angles.i) + len(scene.curves.i) > 0
-
-
-def _has_broadphase(scene: Scene, method: Method) -> bool:
-    return len(scene.broadphase.contact) > 0
-
-
-def _has_requests(scene: Scene, method: Method) -> bool:
-    return scene.rows.value.shape[1] > 0
 
 
 TABLE = (
@@ -331,14 +320,14 @@ TABLE = (
     Row(
         Hook.ELEMENT,
         _INT(_INT, _T, _PTR, _INT, _INT),  # context, t, y, element, component
-        lambda scene, method: len(scene.residuals.id) > 0,
+        _rows("residuals", "id"),
         _of("pipeline.force_hooks", "serve_element"),
         "solves a Force_Element for what expressions ask of it",
     ),
     Row(
         Hook.JOINTS,
         _INT(_INT, _INT, _T, _PTR, _PTR),  # context, request, t, y, dy
-        _has_joints,
+        _rows("tree", "body"),
         _joints,
         "does what joints are asked for: `Joints`",
     ),
@@ -351,6 +340,14 @@ TABLE = (
         "an answer, or less a code",
     ),
     Row(
+        Hook.HIGHER_PAIRS,
+        _INT(_INT, _INT, _INT, _PTR),  # context, term, 1 to find anew where it touches, y
+        _rows("curves", "i"),
+        _of("pipeline.force_hooks", "fill_higher_pair"),
+        "fills a term of an equation of a higher pair",
+        "0; it cannot fail",
+    ),
+    Row(
         Hook.REACTION_FORCES,
         _FORCES,
         _has_reaction_forces,
@@ -360,7 +357,7 @@ TABLE = (
     Row(
         Hook.EVALUATE,
         HOOK,
-        _always,
+        lambda scene, method: True,
         _of("pipeline.hooks", "rhs"),
         "evaluates y' at a point that is no step's: of a row, within one, of another branch",
     ),
@@ -464,12 +461,12 @@ TABLE = (
         lambda of: _of(
             "pipeline.force_hooks", ("commit_turns", "commit_ways")[len(of.curves.i) > 0]
         )(of),
-        "counts the turns of angles, and follows points along curves",
+        "counts the turns of angles, and follows higher pairs",
     ),
     Row(
         Hook.NEAR,
         _INT(_INT, _PTR),  # context, y
-        _has_broadphase,
+        _rows("broadphase", "contact"),
         _of("pipeline.hooks", "list_near"),
         "lists near pairs anew where shapes have moved far enough",
     ),
@@ -477,7 +474,7 @@ TABLE = (
     Row(
         Hook.REQUESTS,
         _AT,
-        _has_requests,
+        lambda scene, method: scene.rows.value.shape[1] > 0,
         _of("pipeline.force_hooks", "evaluate_requests"),
         "evaluates the expressions of requests",
     ),

@@ -1,8 +1,8 @@
-"""CURVE and PTCV of an Adams deck: curves in space, and points that stay on them."""
+"""CURVE, PTCV and CVCV of an Adams deck: curves in space, and what stays on them."""
 
 from __future__ import annotations
 
-from mbsim.model import elements as el
+from mbsim.model.curves import CurveOnCurve, PointOnCurve
 from mbsim.reader.adm.declare import ANY, AdmStatement, numbers
 from mbsim.reader.adm.translate import read_as
 from mbsim.reader.curves import REFERENCE_PARAM_CURVE
@@ -10,6 +10,7 @@ from mbsim.reader.kinds import FLAG, ID, INTEGER, REAL
 from mbsim.reader.statement import Entry, Spec
 
 _SUBROUTINE = "CURSUB is documented but not built yet; give MATRIX"
+_VELOCITY = "velocities at the start are those of the parts"
 _REPORTED = "says where Adams reports the force; mbsim reports it by markers"
 #: INTERPOLATION_ORDER is one more than the degree.
 _ORDERS = {4: "FALSE", 6: "TRUE"}
@@ -26,13 +27,20 @@ def build_curve(entry: Entry) -> None:
     read_as(entry, REFERENCE_PARAM_CURVE, {"MATRIX": "matrix_id", "CLOSED": "is_u_closed"}, fixed)
 
 
+def _has_place(entry: Entry, marker: str, place: str) -> bool:
+    """Return whether a marker in whose axes a place is given has one; else fault it."""
+    if entry.given(marker) and not entry.given(place):
+        entry.fault(f"is of {place}, which is not given", marker)
+        return False
+    return True
+
+
 def build_point_on_curve(entry: Entry) -> None:
     """Add a point on a curve."""
-    if entry.given("ICM") and not entry.given("DISP"):
-        entry.fault("is of DISP, which is not given", "ICM")
+    if not _has_place(entry, "ICM", "DISP"):
         return
     given = entry.get("DISP")
-    point = el.PointOnCurve(
+    point = PointOnCurve(
         id=entry.get("id", 0),
         i_marker_id=entry.get("I", 0),
         j_marker_id=entry.get("RM", 0),
@@ -42,6 +50,25 @@ def build_point_on_curve(entry: Entry) -> None:
         source=entry.source,
     )
     entry.register(entry.draft.points_on_curves, point)
+
+
+def build_curve_on_curve(entry: Entry) -> None:
+    """Add a curve that touches a curve."""
+    if not (_has_place(entry, "IICM", "IDISP") and _has_place(entry, "JICM", "JDISP")):
+        return
+    pair = CurveOnCurve(
+        id=entry.get("id", 0),
+        i_marker_id=entry.get("IRM", 0),
+        j_marker_id=entry.get("JRM", 0),
+        i_curve_id=entry.get("ICURVE", 0),
+        j_curve_id=entry.get("JCURVE", 0),
+        i_start=entry.get("IDISP"),
+        i_start_marker_id=entry.get("IICM", entry.get("IRM")),
+        j_start=entry.get("JDISP"),
+        j_start_marker_id=entry.get("JICM", entry.get("JRM")),
+        source=entry.source,
+    )
+    entry.register(entry.draft.curves_on_curves, pair)
 
 
 CURVE = AdmStatement(
@@ -68,9 +95,21 @@ PTCV = AdmStatement(
         "RM": Spec(ID, required=True),
         "DISP": Spec(numbers(3)),
         "ICM": Spec(ID),
-        "VEL": Spec(REAL, note="velocities at the start are those of the parts"),
-        "VMAG": Spec(REAL, note="velocities at the start are those of the parts"),
+        **{name: Spec(REAL, note=_VELOCITY) for name in ("VEL", "VMAG")},
     },
     build_point_on_curve,
     xml="Constraint_PTCV",
+)
+CVCV = AdmStatement(
+    "CVCV",
+    {
+        "id": Spec(ID, required=True),
+        **{name: Spec(ID, required=True) for name in ("ICURVE", "IRM", "JCURVE", "JRM")},
+        **{name: Spec(ID, note=_REPORTED) for name in ("IFLOAT", "JFLOAT")},
+        **{name: Spec(numbers(3)) for name in ("IDISP", "JDISP")},
+        **{name: Spec(ID) for name in ("IICM", "JICM")},
+        **{name: Spec(ANY, note=_VELOCITY) for name in ("IVEL", "JVEL", "IVMAG", "JVMAG")},
+    },
+    build_curve_on_curve,
+    xml="Constraint_CVCV",
 )

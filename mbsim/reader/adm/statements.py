@@ -34,7 +34,7 @@ from mbsim.reader.adm.control import (
     build_variable,
 )
 from mbsim.reader.adm.couplers import COUPLER, GEAR
-from mbsim.reader.adm.curves import CURVE, PTCV
+from mbsim.reader.adm.curves import CURVE, CVCV, PTCV
 from mbsim.reader.adm.declare import (
     ANGLE,
     ANY,
@@ -227,6 +227,7 @@ STATEMENTS = (
     GEAR,
     CURVE,
     PTCV,
+    CVCV,
     AdmStatement(
         "GCON",
         {

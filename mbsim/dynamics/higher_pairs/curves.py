@@ -10,15 +10,16 @@ import math
 
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1, V3
-from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, scale, sub
 from mbsim.dynamics.bodies.markers import marker_axis, marker_point
 
 #: Most corrections of a parameter.
-_MOST = 100
+MOST = 100
 #: The last one is less than this part of a piece.
 _ENOUGH = 1e-14
+#: Rounding changes it by less than this part.
+_SMALL = 1e-9
 #: A second slope of the distance below this part of that of a straight line is none.
 _LEAST = 0.1
 
@@ -44,16 +45,33 @@ def piece_at(scene: Scene, c: int, u: float) -> tuple[int, float]:
 
 
 @jitable
-def curve_point(scene: Scene, c: int, u: float) -> tuple[V3, V3, V3]:
-    """Return the point of curve c at parameter u, and its first and second slope, in J's axes."""
+def curve_point(scene: Scene, c: int, u: float) -> tuple[V3, V3, V3, V3]:
+    """Return the point of curve c at parameter u, and its first three slopes, in its own axes."""
     k, s = piece_at(scene, c, u)
     p = scene.curves.coefficient[k]
-    x, dx, ddx = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    x, dx = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    ddx, dddx = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for n in range(5, -1, -1):
+        dddx = (s * dddx[0] + 3.0 * ddx[0], s * dddx[1] + 3.0 * ddx[1], s * dddx[2] + 3.0 * ddx[2])
         ddx = (s * ddx[0] + 2.0 * dx[0], s * ddx[1] + 2.0 * dx[1], s * ddx[2] + 2.0 * dx[2])
         dx = (s * dx[0] + x[0], s * dx[1] + x[1], s * dx[2] + x[2])
         x = (s * x[0] + p[n, 0], s * x[1] + p[n, 1], s * x[2] + p[n, 2])
-    return x, dx, ddx
+    return x, dx, ddx, dddx
+
+
+@jitable
+def longest_change(scene: Scene, c: int, u: float) -> float:
+    """Return by how much the parameter of curve c is changed at once at most: by a piece."""
+    return scene.curves.length[piece_at(scene, c, u)[0]]
+
+
+@jitable
+def settled(change: float, before: float) -> bool:
+    """Return whether a change, in parts of a piece, is the last; `before` is the one before it.
+
+    Rounding ends it too: changes that are small and get no smaller are that.
+    """
+    return change <= _ENOUGH or (change <= _SMALL and change >= 0.5 * before)
 
 
 @jitable
@@ -62,18 +80,19 @@ def nearest_parameter(scene: Scene, c: int, d: V3) -> float:
 
     With r = d - x(u): r . x' = 0, by Newton's method, no further than a piece at once.
     """
-    u = scene.state.along[c]
-    for _ in range(_MOST):
-        x, dx, ddx = curve_point(scene, c, u)
+    u, before = scene.state.along[c], math.inf
+    for _ in range(MOST):
+        x, dx, ddx, _ = curve_point(scene, c, u)
         r = sub(d, x)
         straight = dot(dx, dx)
         bent = straight - dot(r, ddx)
-        change = dot(r, dx) / (bent if bent > _LEAST * straight else straight)
-        longest = scene.curves.length[piece_at(scene, c, u)[0]]
-        change = min(longest, max(-longest, change))
-        u += change
-        if abs(change) <= _ENOUGH * longest:
+        longest = longest_change(scene, c, u)
+        part = dot(r, dx) / (bent if bent > _LEAST * straight else straight) / longest
+        part = min(1.0, max(-1.0, part))
+        u += part * longest
+        if settled(abs(part), before):
             break
+        before = abs(part)
     return u
 
 
@@ -96,7 +115,7 @@ def across(scene: Scene, c: int, tangent: V3, which: int) -> V3:
     They follow the axis of J which the curve is least along at the committed state, so that they
     are smooth within a step.
     """
-    _, t, _ = curve_point(scene, c, scene.state.along[c])
+    _, t, _, _ = curve_point(scene, c, scene.state.along[c])
     least = 0
     for k in range(1, 3):
         if abs(t[k]) < abs(t[least]):
@@ -113,18 +132,10 @@ def across(scene: Scene, c: int, tangent: V3, which: int) -> V3:
 
 
 @jitable
-def commit_curves(scene: Scene, y: F1) -> int:
-    """Take the parameters of points that curves hold as committed; return a code.
-
-    A point that has come to the end of an open curve has nowhere to go.
-    """
+def beyond_end(scene: Scene, c: int, u: float) -> bool:
+    """Return whether u is beyond an end of curve c, open, while its element takes part."""
     curves = scene.curves
-    for c in range(len(curves.closed)):
-        u = nearest_parameter(scene, c, seen_from(scene, y, c))
-        scene.state.along[c] = u
-        first, last = curves.first[c], curves.first[c + 1] - 1
-        end = curves.begin[last] + curves.length[last]
-        holds = curves.closed[c] == 0 and scene.equations.off[curves.equation[c]] == 0
-        if holds and not curves.begin[first] <= u <= end:
-            return Code.END_OF_CURVE
-    return 0
+    first, last = curves.first[c], curves.first[c + 1] - 1
+    end = curves.begin[last] + curves.length[last]
+    holds = curves.closed[c] == 0 and scene.equations.off[curves.equation[c]] == 0
+    return holds and not curves.begin[first] <= u <= end

@@ -1,0 +1,156 @@
+"""Points and curves that stay on curves, as equations, and where they begin."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from mbsim.arrays import codes
+from mbsim.compile_model.curves import (
+    CurveTable,
+    Pieces,
+    nearest_start,
+    pieces_of,
+    plane_of,
+    samples,
+)
+from mbsim.compile_model.equation_sums import Sums
+from mbsim.compile_model.markers import MarkerTable
+from mbsim.errors import DeckError, Fault
+from mbsim.model.curves import CurveOnCurve, PointOnCurve
+from mbsim.model.elements import Model
+from mbsim.model.names import element_name
+
+Array = np.ndarray
+#: Makes a connection: of statement and id, between marker rows.
+Connect = Callable[[str, int, int, int], int]
+
+#: Equations of each kind: which it is, and whether it is of a length.
+_EQUATIONS = {
+    codes.POINT_ON_CURVE: (
+        ("first offset across the curve", True),
+        ("second offset across it", True),
+    ),
+    codes.CURVE_ON_CURVE: (
+        ("gap of the curves", True),
+        ("offset of their planes", True),
+        ("tilt of their tangents", False),
+    ),
+}
+
+
+def add_higher_pairs(
+    model: Model, markers: MarkerTable, sums: Sums, connect: Connect
+) -> CurveTable:
+    """Add the equations of higher pairs to `sums`; return their curves."""
+    table = CurveTable()
+
+    def hold(statement: str, id: int, row: int, kind: int) -> None:
+        connection = connect(statement, id, *table.markers[row])
+        for which, (name, lengths) in enumerate(_EQUATIONS[kind]):
+            sums.terms.append((codes.HIGHER_PAIR, *table.markers[row], which, kind, 1.0, row))
+            sums.close(connection, name, 0.0, markers.length if lengths else 1.0)
+
+    for point in model.points_on_curves.values():
+        row = _add_point_on_curve(model, markers, table, point, len(sums.program))
+        hold("PTCV", point.id, row, codes.POINT_ON_CURVE)
+    for pair in model.curves_on_curves.values():
+        row = _add_curve_on_curve(model, markers, table, pair, len(sums.program))
+        hold("CVCV", pair.id, row, codes.CURVE_ON_CURVE)
+    return table
+
+
+def _global(markers: MarkerTable, marker_id: int | None, place: tuple[float, ...]) -> Array:
+    """Return a place in the axes of a marker as a global one, (3,)."""
+    p, R = markers.frame(markers.row(marker_id))
+    found: Array = p + R @ np.array(place)
+    return found
+
+
+def _seen_from(markers: MarkerTable, row: int, place: Array) -> Array:
+    """Return a global place in the axes of a marker row, (3,)."""
+    p, R = markers.frame(row)
+    found: Array = R.T @ (place - p)
+    return found
+
+
+def _add_point_on_curve(
+    model: Model, markers: MarkerTable, table: CurveTable, point: PointOnCurve, equation: int
+) -> int:
+    """Return the row of a curve that holds a point."""
+    i, j = markers.row(point.i_marker_id), markers.row(point.j_marker_id)
+    near, _ = markers.frame(i)
+    if point.start is not None:
+        near = _global(markers, point.start_marker_id, point.start)
+    curve = model.curves[point.curve_id]
+    pieces = pieces_of(curve)
+    row = table.add(curve, pieces, (i, j), equation)
+    table.along[row] = nearest_start(pieces, _seen_from(markers, j, near))
+    return row
+
+
+def _add_curve_on_curve(
+    model: Model, markers: MarkerTable, table: CurveTable, pair: CurveOnCurve, equation: int
+) -> int:
+    """Return the row of the first of two curves that touch; the second is the next."""
+    i, j = markers.row(pair.i_marker_id), markers.row(pair.j_marker_id)
+    curves = model.curves[pair.i_curve_id], model.curves[pair.j_curve_id]
+    made = [pieces_of(curve) for curve in curves]
+    planes = [plane_of(pieces) for pieces in made]
+    for plane, attribute in zip(planes, ("i_curve_id", "j_curve_id"), strict=True):
+        if not plane.flat:
+            id = getattr(pair, attribute)
+            raise _fault(model, pair, f'{attribute}="{id}": must lie in a plane, and does not')
+    normals = [plane.normal for plane in planes]
+    (_, R_i), (_, R_j) = markers.frame(i), markers.frame(j)
+    if normals[1] is None and normals[0] is not None:
+        normals[1] = R_j.T @ R_i @ normals[0]
+    if normals[1] is None:
+        raise _fault(model, pair, "both curves are straight: they have no one point in common")
+    row = table.add(curves[0], made[0], (i, j), equation)
+    table.add(curves[1], made[1], (i, j), equation)
+    table.touching[row : row + 2] = 1, 2
+    table.normal[row + 1] = normals[1]
+    begins = (
+        _global(markers, pair.i_start_marker_id, pair.i_start) if pair.i_start else None,
+        _global(markers, pair.j_start_marker_id, pair.j_start) if pair.j_start else None,
+    )
+    frames = markers.frame(i), markers.frame(j)
+    table.along[row : row + 2] = _touch_near(made, frames, begins)
+    return row
+
+
+def _fault(model: Model, pair: CurveOnCurve, message: str) -> DeckError:
+    """Return an error of two curves that touch."""
+    name = element_name(model.file, "Constraint_CVCV", pair.id)
+    return DeckError([Fault(pair.source.file, pair.source.line, name, message)])
+
+
+def _touch_near(
+    made: list[Pieces],
+    frames: tuple[tuple[Array, Array], tuple[Array, Array]],
+    begins: tuple[Array | None, Array | None],
+) -> tuple[float, float]:
+    """Return the parameters of where two curves nearly touch, as good as samples are.
+
+    Of one whose begin is given it is next to that. Of all pairs of a sample and the nearest one of
+    the other curve it is the one with the least distance and angle, that times half the extent.
+    """
+    from scipy.spatial import cKDTree
+
+    us, places, ways = [], [], []
+    for pieces, (p, R), near in zip(made, frames, begins, strict=True):
+        u, x, t = samples(pieces)
+        x, t = p + x @ R.T, t @ R.T
+        if near is not None:
+            k = np.argmin(np.linalg.norm(x - near, axis=-1))
+            u, x, t = u[k : k + 1], x[k : k + 1], t[k : k + 1]
+        us.append(u)
+        places.append(x)
+        ways.append(t / np.linalg.norm(t, axis=-1)[:, None])
+    distance, other = cKDTree(places[1]).query(places[0])
+    angle = np.linalg.norm(np.cross(ways[0], ways[1][other]), axis=-1)
+    extent = 0.5 * min(float(np.linalg.norm(np.ptp(x, axis=0))) for x in places)
+    best = int(np.argmin(distance**2 + (extent * angle) ** 2))
+    return float(us[0][best]), float(us[1][other[best]])

@@ -1,0 +1,1 @@
+"""Points and curves of a body that stay on curves and surfaces of another."""
