@@ -21,7 +21,8 @@ BODIES = ("Body_Rigid", "Body_Point")
 _NAMED_BY = {
     "marker": ("Reference_Marker",),
     **dict.fromkeys(("rm", "cg", "im", "lprf", "vm", "wm"), ("Reference_Marker",)),
-    "body": BODIES,
+    **dict.fromkeys(("body", "bodies"), BODIES),
+    "clusters": ("Reference_2DCluster",),
     "graphics": ("Post_Graphic",),
     "joint": ("Constraint_Joint",),
     "array": ("Reference_Array",),

@@ -36,6 +36,16 @@ class MultiPointDraft:
     source: el.Source = field(default_factory=el.Source)
 
 
+@dataclass(frozen=True)
+class PlanarCluster:
+    """A Reference_2DCluster as it is read: it becomes joints where a Subsystem_Planar names it."""
+
+    id: int
+    plane: str
+    bodies: tuple[int, ...]
+    source: el.Source
+
+
 @dataclass
 class Draft:
     """Elements by id and the findings; `broken` holds (statement, id) with a fault of their own.
@@ -74,6 +84,8 @@ class Draft:
     splines: dict[int, el.Spline] = field(default_factory=dict)
     curves: dict[int, ParamCurve] = field(default_factory=dict)
     curve_matrices: dict[int, int] = field(default_factory=dict)  # of curves that these give
+    clusters: dict[int, PlanarCluster] = field(default_factory=dict)
+    planar: dict[int, el.Source] = field(default_factory=dict)  # clusters in force
     arrays: dict[int, el.ArrayOfNumbers] = field(default_factory=dict)
     control: ControlDraft = field(default_factory=ControlDraft)
     requests: dict[int, el.Request] = field(default_factory=dict)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from mbsim.reader.activity import ACTIVATE, DEACTIVATE
 from mbsim.reader.bodies import BODY_RIGID, PARAM_UNIT, REFERENCE_MARKER
 from mbsim.reader.changes import CHANGEABLE, change
+from mbsim.reader.clusters import REFERENCE_2D_CLUSTER, SUBSYSTEM_PLANAR
 from mbsim.reader.command import FORCE_GRAVITY, PARAM_STATIC, PARAM_TRANSIENT, SIMULATE, STOP
 from mbsim.reader.constraints import (
     CONSTRAINT_COUPLER,
@@ -73,6 +74,8 @@ STATEMENTS = (
     REFERENCE_ARRAY,
     REFERENCE_MATRIX,
     REFERENCE_PARAM_CURVE,
+    REFERENCE_2D_CLUSTER,
+    SUBSYSTEM_PLANAR,
     SENSOR_EVENT,
     SENSOR_EVALUATE,
     POST_REQUEST,

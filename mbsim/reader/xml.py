@@ -16,6 +16,7 @@ from mbsim.errors import DeckError, Fault, ModelError
 from mbsim.model import elements as el
 from mbsim.model.checks import Known, check_model
 from mbsim.model.names import is_adams, is_commands
+from mbsim.reader.clusters import hold_clusters
 from mbsim.reader.constraints import complete_motions
 from mbsim.reader.controls import complete_sensors
 from mbsim.reader.curves import complete_curves
@@ -108,6 +109,7 @@ def _read(path: Given, texts: tuple[str, ...]) -> el.Model:
     draft.faults.extend(map(said_so, complete_curves(draft)))
     draft.faults.extend(map(said_so, check_plants(draft)))
     complete_motions(draft)
+    draft.faults.extend(map(said_so, hold_clusters(draft, _to_model(draft, deck, ""))))
     draft.faults.extend(map(said_so, complete_gears(draft, _to_model(draft, deck, ""))))
     model = _to_model(draft, deck, hashlib.sha256(data + draft.more).hexdigest())
     known = Known(frozenset(draft.broken), draft.display_graphics)

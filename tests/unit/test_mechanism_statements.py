@@ -410,3 +410,33 @@ def test_verlet_refuses_joints(tmp_path: Path) -> None:
         ModelError, match=r"Constraint_Joint\[1\]: integrator VERLET is for free bodies.*joints"
     ):
         simulate(model, end_time=0.1, integrator="VERLET")
+
+
+PLANAR = '<Reference_2DCluster id="1" planar_type="{}">{}</Reference_2DCluster>{}'
+NAMED = "<Subsystem_Planar> 1 </Subsystem_Planar>"
+
+
+def test_bodies_of_a_cluster_are_held_in_its_plane(tmp_path: Path) -> None:
+    model = read(tmp_path, added(REVOLUTE + PLANAR.format("YZ", 2, NAMED)))
+    held = model.joints[2]
+    assert held.type == "PLANAR"
+    assert [model.markers[id].body_id for id in (held.i_marker_id, held.j_marker_id)] == [2, 1]
+    assert list(read(tmp_path, added(PLANAR.format("YZ", 2, ""))).joints) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (PLANAR.format("UV", 2, NAMED), 'planar_type="UV": must be one of XY, YZ, ZX'),
+        (PLANAR.format("XY", 9, NAMED), r"Reference_2DCluster\[1\]: there is no body 9"),
+        (PLANAR.format("XY", 1, NAMED), "body 1 is ground, which does not move"),
+        (NAMED, "Subsystem_Planar: there is no Reference_2DCluster 1"),
+        (
+            '<Reference_2DCluster id="1" planar_type="XY" num_body="2">2</Reference_2DCluster>',
+            'num_body="2": must be the number of ids in the list, 1',
+        ),
+    ],
+)
+def test_clusters_that_do_not_fit(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(DeckError, match=said):
+        read(tmp_path, added(text))

@@ -27,6 +27,9 @@ from mbsim.arrays.codes import (
     KEPT,
     KEPT_PIVOT,
     OFFSET,
+    PAIR_RATE,
+    PAIR_SECOND,
+    PAIR_VALUE,
     PERP,
     PIVOT,
     TOUCHING,
@@ -99,7 +102,8 @@ def fill_terms(scene: Scene, t: float, y: F1, e: int, anew: int) -> None:
             g, dg, ddg = twist_term(scene, y, i, j, G)
         elif kind == HIGHER_PAIR:
             call_int(scene.world.hooks[Hook.HIGHER_PAIRS], (scene, k, anew, y))
-            g, dg, ddg = sweep.pair[0], sweep.pair[1], sweep.pair[2]
+            g, dg = sweep.pair[PAIR_VALUE], sweep.pair[PAIR_RATE]
+            ddg = sweep.pair[PAIR_SECOND]
         else:
             g, dg, ddg = distance_term(scene, y, i, j, G)
         value += factor * g

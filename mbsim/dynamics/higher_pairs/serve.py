@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import AXIS_I, AXIS_J, POINT_ON_CURVE
+from mbsim.arrays.codes import (
+    AXIS_I,
+    AXIS_J,
+    PAIR_RATE,
+    PAIR_SECOND,
+    PAIR_VALUE,
+    POINT_ON_CURVE,
+)
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
@@ -32,8 +39,8 @@ def fill_pair(scene: Scene, k: int, anew: int, y: F1) -> None:
         if anew == 1:
             located[row], located[row + 1] = locate_touch(scene, y, row)
         found = curve_on_curve_term(scene, y, row, which, G)
-    for n in range(3):
-        scene.sweep.pair[n] = found[n]
+    pair = scene.sweep.pair
+    pair[PAIR_VALUE], pair[PAIR_RATE], pair[PAIR_SECOND] = found
 
 
 @jitable
