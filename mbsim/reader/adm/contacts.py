@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 
-from mbsim.reader.adm.declare import ANY, IDS_BY_COMMAS, AdmStatement
+from mbsim.reader.adm.declare import ANY, IDS_BY_COMMAS, ROUTINE, AdmStatement
 from mbsim.reader.adm.draft import require
+from mbsim.reader.adm.subroutine import as_attributes, routine
 from mbsim.reader.adm.translate import read_as
 from mbsim.reader.contact import FORCE_CONTACT
 from mbsim.reader.graphics import POST_GRAPHIC
 from mbsim.reader.keywords import spellings
-from mbsim.reader.kinds import ID, NOT_NEGATIVE, POSITIVE, REAL, TEXT, UNIT, keyword
+from mbsim.reader.kinds import ID, NOT_NEGATIVE, POSITIVE, REAL, TEXT, UNIT, USER, keyword
 from mbsim.reader.statement import Entry, Spec
 
 #: Type of graphic -> the XML type and what its arguments are there.
@@ -117,23 +118,39 @@ _NAMES = {
 
 def build_contact(entry: Entry) -> None:
     """Add a contact."""
-    model = entry.get("MODEL")
+    normal = routine(entry, "CNFSUB", "NORMAL_")
+    friction = routine(entry, "CFFSUB", "FRICTION_")
+    by_user = {"cnf": (normal, "MODEL"), "cff": (friction, "COULOMB_FRICTION")}
+    fixed: dict[str, str] = {}
+    for prefix, (user, other) in by_user.items():
+        if user is None:
+            continue
+        if entry.given(other):
+            entry.fault("goes without a function of your own for it", other)
+        attributes = as_attributes(user, prefix)
+        if attributes.get("script_name", "") != fixed.get(
+            "script_name", attributes.get("script_name", "")
+        ):
+            entry.fault("must be in the file of NORMAL_ROUTINE", "FRICTION_ROUTINE")
+        fixed |= attributes | {f"{prefix}_type": f"USER{prefix.upper()}"}
+    model = "USERCNF" if normal else entry.get("MODEL")
     if model is None:
         require(entry, "MODEL")
     if model is None or entry.get("IGEOM") is None or entry.get("JGEOM") is None:
         return
-    for name in _NORMAL[model]:
+    for name in _NORMAL.get(model, ()):
         if name != "DAMPING" and name != "DMAX":
             require(entry, name)
     for other in _NORMAL:
         for name in _NORMAL[other] if other != model else ():
             if entry.given(name):
-                entry.fault(f"belongs to {other}; this is {model}", name)
+                what = "by NORMAL_FUNCTION" if normal else model
+                entry.fault(f"belongs to {other}; this is {what}", name)
     if entry.get("COULOMB_FRICTION", "COULOMB_OFF") != "COULOMB_OFF":
         only = entry.get("COULOMB_FRICTION") == "COULOMB_DYNAMICONLY"
         for name in _FRICTION[1::2] if only else _FRICTION:
             require(entry, name)
-    read_as(entry, FORCE_CONTACT, _NAMES, {"cnf_type": model})
+    read_as(entry, FORCE_CONTACT, _NAMES, fixed | {"cnf_type": model})
 
 
 _BRISTLES = (
@@ -142,7 +159,6 @@ _BRISTLES = (
 )
 _FLAT = "contact of curves is documented but not built yet"
 _FLEXIBLE = "flexible bodies are documented but not built yet"
-_BY_USER = "is documented but not built yet in .adm decks; an XML deck's Force_Contact has it"
 _ONOFF = keyword(spellings(ON="YES TRUE", OFF="NO FALSE"))
 CONTACT = AdmStatement(
     "CONTACT",
@@ -171,13 +187,8 @@ CONTACT = AdmStatement(
         ),
         **{name: Spec(ANY, refused=_FLAT) for name in ("ICURVE", "JCURVE", "IFLIP", "JFLIP")},
         **{name: Spec(ANY, refused=_FLEXIBLE) for name in ("IFLEX", "JFLEX")},
-        **{
-            name: Spec(ANY, refused=_BY_USER)
-            for name in (
-                *("NORMAL_FUNCTION", "NORMAL_ROUTINE", "FRICTION_FUNCTION", "FRICTION_ROUTINE"),
-                "ROUTINE",
-            )
-        },
+        **{name: Spec(USER) for name in ("NORMAL_FUNCTION", "FRICTION_FUNCTION")},
+        **{name: Spec(ROUTINE) for name in ("NORMAL_ROUTINE", "FRICTION_ROUTINE")},
     },
     build_contact,
     words={name: ("MODEL", name) for name in _NORMAL},

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mbsim.reader.adm.declare import ANY, LIST, NUMBERS, ROUTINE, AdmStatement
-from mbsim.reader.adm.subroutine import routine
+from mbsim.reader.adm.subroutine import as_attributes, routine
 from mbsim.reader.adm.translate import read_as, written
 from mbsim.reader.control_siso import CONTROL_SISO
 from mbsim.reader.control_state_eqn import CONTROL_STATE_EQN
@@ -108,16 +108,9 @@ def build_general(entry: Entry) -> None:
     user = routine(entry, "GSESUB")
     if user is None:
         return
-    fixed = {
-        "usrsub_param_string": f"USER({','.join(map(repr, user.par))})",
-        "usrsub_fnc_name": user.fnc_name,
-    }
-    if user.dll_name:
-        fixed["usrsub_dll_name"] = user.dll_name
-    elif user.script_name:
-        fixed["script_name"] = user.script_name
     names = _ARRAYS | {"IC": "ic_array_id", "STATIC_HOLD": "is_static_hold"}
-    read_as(entry, CONTROL_STATE_EQN, names | {"NS": "num_state", "NO": "num_output"}, fixed)
+    names |= {"NS": "num_state", "NO": "num_output"}
+    read_as(entry, CONTROL_STATE_EQN, names, as_attributes(user, "usrsub"))
 
 
 _DISCRETE = "discrete states are documented but not built yet"

@@ -12,26 +12,28 @@ from mbsim.reader.statement import Entry
 from mbsim.reader.subroutine import result
 
 
-def routine(entry: Entry, default: str) -> el.Subroutine | None:
+def routine(entry: Entry, default: str, of: str = "") -> el.Subroutine | None:
     """Return the subroutine of a statement, None where its FUNCTION is none or is faulty.
 
-    `default` is the name of the function where ROUTINE is not given.
+    `default` is the name of the function where ROUTINE is not given, `of` what stands before both
+    words, as NORMAL_ does.
     """
-    par = entry.get("FUNCTION")
+    function, named = f"{of}FUNCTION", f"{of}ROUTINE"
+    par = entry.get(function)
     if not isinstance(par, tuple):
-        if entry.given("ROUTINE") and (par is not None or not entry.given("FUNCTION")):
-            entry.fault("belongs to FUNCTION=USER(...), which is not given", "ROUTINE")
+        if entry.given(named) and (par is not None or not entry.given(function)):
+            entry.fault(f"belongs to {function}=USER(...), which is not given", named)
         return None
-    file, _, name = entry.get("ROUTINE", "").rpartition("::")
-    if not entry.given("ROUTINE"):
-        entry.note(f"not given; taken as {default}", "ROUTINE")
+    file, _, name = entry.get(named, "").rpartition("::")
+    if not entry.given(named):
+        entry.note(f"not given; taken as {default}", named)
     script = ""
     if file:
         path = Path(file)
         path = path if path.is_absolute() else entry.draft.directory / path
         script = os.path.realpath(path)
         if not path.is_file():
-            entry.fault("no such file (the path is relative to the deck)", "ROUTINE")
+            entry.fault("no such file (the path is relative to the deck)", named)
     if Path(script).suffix.lower() in LIBRARIES:
         return el.Subroutine(par, name or default, dll_name=script, source=entry.source)
     return el.Subroutine(par, name or default, script_name=script, interpreter="PYTHON")
@@ -45,3 +47,12 @@ def function_or_user(
     if user is not None:
         return result(entry, statement, user), user
     return entry.get("FUNCTION"), None
+
+
+def as_attributes(user: el.Subroutine, prefix: str) -> dict[str, str]:
+    """Return a subroutine as attributes of XML, whose names begin with `prefix`."""
+    par = ", ".join(map(repr, user.par))
+    found = {f"{prefix}_param_string": f"USER({par})", f"{prefix}_fnc_name": user.fnc_name}
+    if user.dll_name:
+        return found | {f"{prefix}_dll_name": user.dll_name}
+    return found | ({"script_name": user.script_name} if user.script_name else {})
