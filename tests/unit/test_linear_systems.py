@@ -130,7 +130,7 @@ def test_a_loop_through_the_direct_part_is_a_circle():
         ('ic_array_id="4"', 'num_state="3"', 11, "says 3 x; its matrices have 2"),
         ('a_matrix_id="1"', 'a_matrix_id="7"', 11, "A: matrix 7 is not in the deck"),
         (' u_array_id="1"', "", 12, "needs u_array_id too"),
-        ('ic_array_id="4"', 'type="USERSUB"', 11, "USERSUB is not built yet"),
+        ('ic_array_id="4"', 'type="USERSUB"', 11, "usrsub_param_string: missing"),
         ('ncol="1">0 1<', 'ncol="1">0 1 2<', 9, "there are 3 numbers for 2 x 1"),
         ('ncol="1">0 1<', 'ncol="1" issparse="TRUE">3 1 2<', 9, "there is no row 3, column 1"),
         ("ARYVAL(2,1)", "ARYVAL(2,2)", 13, "ARYVAL(2, 2): array 2 has 1 elements"),
