@@ -72,8 +72,9 @@ from mbsim.sensitivity.twin import half_step, keep_change, keep_side, set_parame
 #: Rows of `Variations.work`: a point, f on either side, D at a stage, its slopes.
 POINT, UPPER, LOWER, STAGE, FIRST = range(5)
 SECOND, THIRD, WORK = FIRST + 1, FIRST + 2, FIRST + 7
-#: After so many tries less is asked for; the shortest part of a step.
-MANY_PARTS, SHORTEST = 60, 1e-9
+#: After so many tries that led no farther than this part of a stretch less is asked for; the
+#: shortest part of a step.
+MANY_PARTS, PROGRESS, SHORTEST = 60, 0.01, 1e-9
 #: What is no longer taken for rounding.
 ROUGHEST = 1e-5
 #: Of a part of the step: begin and end of the stretch it is in, its length in the step's, its time.
@@ -219,14 +220,16 @@ def integrate(
     the steps get short.
     """
     w, d, s, part, most = V.work, V.next[k], begin, end - begin, V.enough[0]
-    tries = 0
+    tries, before = 0, begin
     while s < end:
         tries += 1
         if tries % MANY_PARTS == 0:
-            # what is left is rounding of forces
-            most *= 10.0
-            if most > ROUGHEST:
-                return Code.NOT_CONVERGED
+            if s - before < PROGRESS * (end - begin):
+                # what is left is rounding of forces
+                most *= 10.0
+                if most > ROUGHEST:
+                    return Code.NOT_CONVERGED
+            before = s
         last = s + 1.0001 * part >= end
         part = end - s if last else part
         code, error = try_part(V, scene, t, h, k, (begin, end, part, part * h), s, e)

@@ -25,7 +25,10 @@ ASKED, BENT = 17, 18
 # whether points are on a straight line instead of on the step's polynomial; whether friction asks
 # for another branch beside the run than in it at the end of a step
 STRAIGHT, ODD = 19, 20
-WORDS = 21
+# whether derivatives are integrated along every step of the method, which has no step of its own
+# for them
+ALONG = 21
+WORDS = 22
 #: Rows of `Variations.jump`: y before the commit, f before and behind it.
 BEFORE, F_BEFORE, F_BEHIND = range(3)
 #: Contacts that may begin or end within one step.

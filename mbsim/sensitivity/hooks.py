@@ -16,6 +16,8 @@ from mbsim.core.arrays import F1, Pointer
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import Problem, Taken
+from mbsim.integrators.galpha_iteration import DOT, LAST
+from mbsim.integrators.positions import is_rate
 from mbsim.integrators.scheme import (
     LAST_STEP,
     LAST_TIME,
@@ -35,6 +37,7 @@ from mbsim.sensitivity.along import (
     step_along,
 )
 from mbsim.sensitivity.arrays import (
+    ALONG,
     ASKED,
     ATTEMPT,
     BEFORE,
@@ -90,6 +93,9 @@ def fit(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> i
     """Fill the polynomials of the run's step, and of derivative k of an explicit one."""
     if V.words[ATTEMPT] != 0:
         return fit_beside(V, scene, m, t, h, k)
+    if V.words[ALONG] == 1:
+        fit_hermite(V, m, h)
+        return 0
     for i in range(len(m.y)):
         V.path[0, i] = m.y[i]
         for j in range(3):
@@ -98,11 +104,26 @@ def fit(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> i
 
 
 @jitable
+def fit_hermite(V: Variations, m: Method, h: float) -> None:
+    """Fill the cubic polynomial of a step of generalised-alpha, as its `fit_dense` has it."""
+    for i in range(len(m.y)):
+        rate = is_rate(m, i)
+        first = m.kept[DOT, i] if rate else m.k[0, i]
+        last = m.ahead[DOT, i] if rate else m.k[LAST, i]
+        rise = m.trial[i] - m.y[i]
+        V.path[0, i], V.path[1, i] = m.y[i], rise
+        V.path[2, i], V.path[3, i] = h * first - rise, 2.0 * rise - h * (first + last)
+
+
+@jitable
 def carry(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
     """Fill derivative k at the end of the step that is taken; return a code."""
     for s in range(len(V.seen)):
         V.seen[s] = 0
-    if V.words[ATTEMPT] == 0:
+    code = 0
+    if V.words[ALONG] == 1:
+        V.error[k] = math.inf
+    elif V.words[ATTEMPT] == 0:
         code = implicit_step(V, scene, m, t, h, k)
         if code == Code.NOT_CONVERGED:
             # with an old linearisation, where forces bend: not so along the motion

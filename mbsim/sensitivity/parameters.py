@@ -30,6 +30,8 @@ _ASIDES = (
 )  # fmt: skip
 #: Numbers that differ by less, over their size, differ by rounding.
 _ROUNDING = 1e-13
+#: Methods of which derivatives are known.
+_METHODS = ("AUTO", "DOPRI5", "DOP853", "RADAU5", "GALPHA")
 #: Scratch that nothing fills but the build: shapes that stand still.
 _FILLED_ONCE = "work/frames"
 
@@ -166,8 +168,8 @@ def replaced(whole: Any, made: Mapping[str, Array], path: str = "") -> Any:
 def refused(system: System, settings: Any) -> str | None:
     """Return why sensitivities are not for a run, None where they are."""
     model = system.model
-    if settings.integrator not in ("AUTO", "DOPRI5", "DOP853", "RADAU5"):
-        return f"integrator {settings.integrator} has none; take AUTO, DOPRI5, DOP853 or RADAU5"
+    if settings.integrator not in _METHODS:
+        return f"integrator {settings.integrator} has none; take one of {', '.join(_METHODS)}"
     if system.needs_fcl:
         return "FCL finds contacts of this model, whose normals scatter by 2e-6"
     stages = [stage.simulation for stage in settings.stages]

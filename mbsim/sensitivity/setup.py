@@ -182,6 +182,8 @@ class Sensitivities:
 
     def bind(self, running: scheme.Scheme, problem: Problem, workspace: Any) -> None:
         """Go on with the method that runs; `workspace` is the table of its own."""
+        from mbsim.integrators import galpha
+
         words, n = self.arrays.words, self.arrays.d.shape[1]
         own = problem._replace(
             context=int(self._table.ctypes.data),
@@ -203,6 +205,7 @@ class Sensitivities:
         words[at.TWIN] = int(self._table.ctypes.data)
         words[at.ATTEMPT] = 0 if running.implicit else jit.address(running.attempt, HOOK)
         words[at.FIT_DENSE] = 0 if running.implicit else jit.address(running.fit_dense, HOOK)
+        words[at.ALONG] = int(running.implicit and running.carried == galpha.SCHEME.carried)
         words[at.REMEMBERED] = self.system.scene.state.memory.shape[1]
         words[at.JOINTS] = int(self.system.scene.world.hooks[Hook.JOINTS] != 0)
         words[at.FITTED] = 0
