@@ -205,7 +205,7 @@ class Sensitivities:
         words[at.TWIN] = int(self._table.ctypes.data)
         words[at.ATTEMPT] = 0 if running.implicit else jit.address(running.attempt, HOOK)
         words[at.FIT_DENSE] = 0 if running.implicit else jit.address(running.fit_dense, HOOK)
-        words[at.ALONG] = int(running.implicit and running.carried == galpha.SCHEME.carried)
+        words[at.ALONG] = int(running is galpha.SCHEME)
         words[at.REMEMBERED] = self.system.scene.state.memory.shape[1]
         words[at.JOINTS] = int(self.system.scene.world.hooks[Hook.JOINTS] != 0)
         words[at.FITTED] = 0
