@@ -13,6 +13,7 @@ from mbsim.core.codes import AT_ONCE, Code
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import Problem
 from mbsim.integrators.scheme import (
+    AT_ROUNDING,
     CORRECTION,
     CORRECTION_BEFORE,
     EASE,
@@ -95,7 +96,7 @@ def note(m: Method, size: float) -> None:
 def begin(m: Method) -> None:
     """Be as hopeful about the first correction as the step before allows."""
     m.memory[RETRY] = HALF
-    m.memory[CORRECTION] = 0.0
+    m.memory[CORRECTION] = m.memory[AT_ROUNDING] = 0.0
     note(m, 0.0)
     hope = max(m.memory[REST], LEAST_REST**1.25) ** 0.8
     m.memory[REST] = 1.0 if m.memory[FRESH] == 1.0 else hope
@@ -157,9 +158,10 @@ def is_rounding(p: Problem, m: Method, t: float, h: float, size: float, e: F1) -
     position round these worse: of friction counts what it can do, not what tol is.
     """
     most = LEFT * judged_by(m)
-    if size <= most:
-        return True
-    return size <= FELT and call_float(p.norm, (p.context, t, h, e, m.y)) <= most
+    some = size <= most
+    some = some or (size <= FELT and call_float(p.norm, (p.context, t, h, e, m.y)) <= most)
+    m.memory[AT_ROUNDING] = 1.0 if some else 0.0
+    return some
 
 
 @jitable
@@ -167,8 +169,10 @@ def with_ease(m: Method, linearised: int, code: int) -> int:
     """Let steps grow as it is easy to solve for them: not behind one that was hard, then more.
 
     The last one began after so many linearisations, and ended with the code, which is returned.
+    One that ended at rounding was not hard: a longer one ends there too, with no more of them.
     """
-    easy = code == 0 and m.counts[JACOBIANS] - linearised <= EASY
+    few = m.counts[JACOBIANS] - linearised <= EASY
+    easy = code == 0 and (few or m.memory[AT_ROUNDING] == 1.0)
     m.memory[EASE] = max(1.0, m.memory[EASE]) * EASIER if easy else 1.0
     m.memory[GROWTH] = min(m.memory[GROWTH], m.memory[EASE])
     return code

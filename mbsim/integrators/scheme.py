@@ -120,7 +120,9 @@ EASE = 76
 # of an explicit method: the longest next step within the bound of stability, as its last ones tell,
 # and by how much it may be longer than what was told a step before
 LONGEST, LONGER = range(77, 79)
-MEMORY = 79
+# of implicit methods: 1 where the last iteration ended at rounding
+AT_ROUNDING = 79
+MEMORY = 80
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)
