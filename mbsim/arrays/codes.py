@@ -100,7 +100,7 @@ TURN_LOCKED, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT = range(5)
 OFFSET, PERP, ANGLE, DISTANCE, GENERAL, TOUCHING, TWIST, HIGHER_PAIR = range(8)
 
 # kinds of higher pairs: what is held on what
-POINT_ON_CURVE, CURVE_ON_CURVE = range(2)
+POINT_ON_CURVE, CURVE_ON_CURVE, POINT_ON_SURFACE = range(3)
 
 # entries of `Sweep.pair`
 PAIR_VALUE, PAIR_RATE, PAIR_SECOND = range(3)

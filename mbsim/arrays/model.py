@@ -128,6 +128,26 @@ class Curves(NamedTuple):
 
 
 @tags.constant
+class Surfaces(NamedTuple):
+    """Surfaces on which points of other bodies stay: patches of degree 5 in u and in v.
+
+    On a patch x = sum_nm coefficient[patch, 6 n + m] (u - begin_u)^n (v - begin_v)^m in J's axes;
+    patches of a surface go on along v, then along u.
+    """
+
+    first: I1  # (surfaces + 1,) first patch of each
+    start: I2  # (surfaces, 2) first span along u and along v
+    spans: I2  # (surfaces, 2) how many
+    begin: F1  # (spans,) of u or v
+    length: F1  # (spans,)
+    coefficient: F3  # (patches, 36, 3)
+    closed: I2  # (surfaces, 2) 1 where it goes on at its begin
+    i: I1  # (surfaces,) markers: whose origin is held, and in whose axes the surface is given
+    j: I1  # (surfaces,)
+    equation: I1  # (surfaces,)
+
+
+@tags.constant
 class Programs(NamedTuple):
     """Expressions as instructions of a stack machine."""
 
@@ -305,7 +325,7 @@ class Equations(NamedTuple):
     # pair which of its equations, and its kind
     axis: I2
     factor: F1  # (terms,)
-    angle: I1  # (terms,) row of `Angles`, of a higher pair one of `Curves`, -1 for none
+    angle: I1  # (terms,) row of `Angles`, of a higher pair of `Curves`, `Surfaces`, -1 for none
     active: tags.State[I1]  # (ne + 1,) equations in use, ascending, their number last
 
 

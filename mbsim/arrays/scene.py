@@ -36,6 +36,7 @@ from mbsim.arrays.model import (
     Sensors,
     Slots,
     States,
+    Surfaces,
     Switching,
     Tree,
     Users,
@@ -58,6 +59,7 @@ class Scene(NamedTuple):
     markers: Markers
     angles: Angles
     curves: Curves
+    surfaces: Surfaces
     programs: Programs
     states: States
     sensors: Sensors

@@ -94,7 +94,7 @@ class Sweep(NamedTuple):
     stress: F2  # (ne, 6 nj) self-stresses of implied equations
     jet: F1  # (12,) what a program gives
     pair: F1  # (3,) value, rate and second rate of a term of a higher pair
-    located: F1  # (curves,) parameters of where higher pairs touch
+    located: F1  # (curves + 2 surfaces,) parameters of where higher pairs touch
     share: F2  # (nh, nh) slips of what sticks, by rows: S of stiction.cones, and its matrix
     mix: F2  # (nh, nh)
     cone: F2  # (CONE_ROWS, nh) its vectors

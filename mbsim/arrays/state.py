@@ -69,7 +69,7 @@ class State(NamedTuple):
     since: F1  # (1,) time of the committed state
     centre: F2  # (ng, 3) centres of the graphics at the committed state
     angle: F1  # (na,) at the committed state, whole turns included
-    along: F1  # (curves,) parameter of the point of a curve that holds or touches
+    along: F1  # (curves + 2 surfaces,) parameters of where higher pairs touch
     touching: I1  # (ns,)
     p: F2  # (ns, 3) contact point
     n: F2  # (ns, 3) normal from J into I

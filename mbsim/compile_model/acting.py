@@ -14,6 +14,7 @@ from mbsim.compile_model.gravity import Pull, pulls
 from mbsim.compile_model.instructions import Instruction
 from mbsim.compile_model.markers import MarkerTable, body_rows
 from mbsim.compile_model.mechanism import Mechanism, RigidSlot, constrain
+from mbsim.compile_model.param_surfaces import Function
 from mbsim.compile_model.programs import ProgramTable
 from mbsim.compile_model.states import sensors_table, states_table
 from mbsim.compile_model.switching import switching_table
@@ -104,12 +105,14 @@ def acting(
     runs: bool = True,
     residuals: Mapping[int, UserResidual] | None = None,
     rigid_slots: Sequence[RigidSlot] = (),
+    surfaces: Mapping[int, Function] | None = None,
 ) -> Acting:
     """Return forces, constraints, states, sensors and requests; `first_state`: offset in y.
 
     `looks` says whether a script has py_sysfnc. What only a run needs, laws and what subroutines
     look at, is left out unless it `runs`; so are the unknowns of `residuals`, by element.
-    `rigid_slots`: slots whose friction is rigid.
+    `rigid_slots`: slots whose friction is rigid. `surfaces`: what gives points of each, where they
+    are to be known.
     """
     programs = ProgramTable(
         table,
@@ -124,7 +127,7 @@ def acting(
     elements = [(STATEMENT, id) for id in model.force_elements]
     programs.users = {element: k for k, element in enumerate([*subroutines, *elements])}
     applied, applied_ids = applied_forces(model, table, programs, laws=runs)
-    mechanism = constrain(model, table, programs, rigid_slots)
+    mechanism = constrain(model, table, programs, rigid_slots, surfaces)
     applied, applied_ids = in_order(
         model, applied, applied_ids, mechanism.connections, mechanism.elements, programs
     )

@@ -53,6 +53,7 @@ _STATEMENTS = {
     "GCON": "Constraint_General",
     "PTCV": "Constraint_PTCV",
     "CVCV": "Constraint_CVCV",
+    "PTSF": "Constraint_PTSF",
 }
 
 
@@ -337,6 +338,7 @@ def _scene(
         markers=markers,
         angles=angles,
         curves=mechanism.curves,
+        surfaces=mechanism.surfaces,
         programs=_programs(model, acts, contact_ids),
         states=acts.states,
         sensors=acts.sensors,
@@ -410,6 +412,7 @@ def build(
         code.looks,
         residuals=code.residuals,
         rigid_slots=rigid,
+        surfaces=code.surfaces,
     )
     scene, y0 = _scene(model, placement, plans, code, contacts, judged, table, acts)
     if acts.reader is not None:

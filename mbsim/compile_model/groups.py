@@ -24,7 +24,7 @@ from mbsim.model.placement import Placement, graphic_box
 #: Tables of a model whose elements act.
 _ACTING = (
     *("joints", "primitives", "couplers", "motions", "general_constraints"),
-    *("points_on_curves", "curves_on_curves"),
+    *("points_on_curves", "curves_on_curves", "points_on_surfaces"),
     *FORCES,
 )
 #: Where an expression's references lead, by their statement.
@@ -34,6 +34,7 @@ _TABLES = {
     "MOTION": "motions",
     "PTCV": "points_on_curves",
     "CVCV": "curves_on_curves",
+    "PTSF": "points_on_surfaces",
     **{name: name for name in FORCES},
     "VARIABLE": "variables",
     "DIFF": "differentials",

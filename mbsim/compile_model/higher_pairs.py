@@ -1,12 +1,13 @@
-"""Points and curves that stay on curves, as equations, and where they begin."""
+"""Points and curves that stay on curves and surfaces, as equations, and where they begin."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from mbsim.arrays import codes
+from mbsim.arrays.model import Curves, Surfaces
 from mbsim.compile_model.curves import (
     CurveTable,
     Pieces,
@@ -17,8 +18,16 @@ from mbsim.compile_model.curves import (
 )
 from mbsim.compile_model.equation_sums import Sums
 from mbsim.compile_model.markers import MarkerTable
+from mbsim.compile_model.param_surfaces import (
+    UNKNOWN,
+    Function,
+    SurfaceTable,
+    UnfitSurfaceError,
+    nearest_corner,
+    patches_of,
+)
 from mbsim.errors import DeckError, Fault
-from mbsim.model.curves import CurveOnCurve, PointOnCurve
+from mbsim.model.curves import CurveOnCurve, PointOnCurve, PointOnSurface
 from mbsim.model.elements import Model
 from mbsim.model.names import element_name
 
@@ -32,6 +41,7 @@ _EQUATIONS = {
         ("first offset across the curve", True),
         ("second offset across it", True),
     ),
+    codes.POINT_ON_SURFACE: (("offset off the surface", True),),
     codes.CURVE_ON_CURVE: (
         ("gap of the curves", True),
         ("offset of their planes", True),
@@ -41,15 +51,20 @@ _EQUATIONS = {
 
 
 def add_higher_pairs(
-    model: Model, markers: MarkerTable, sums: Sums, connect: Connect
-) -> CurveTable:
-    """Add the equations of higher pairs to `sums`; return their curves."""
-    table = CurveTable()
+    model: Model,
+    markers: MarkerTable,
+    sums: Sums,
+    connect: Connect,
+    functions: Mapping[int, Function] | None,
+) -> tuple[Curves, Surfaces, Array]:
+    """Add the equations of higher pairs to `sums`; return curves, surfaces and where they begin."""
+    table, surfaces = CurveTable(), SurfaceTable()
 
     def hold(statement: str, id: int, row: int, kind: int) -> None:
-        connection = connect(statement, id, *table.markers[row])
+        pair = (surfaces if kind == codes.POINT_ON_SURFACE else table).markers[row]
+        connection = connect(statement, id, *pair)
         for which, (name, lengths) in enumerate(_EQUATIONS[kind]):
-            sums.terms.append((codes.HIGHER_PAIR, *table.markers[row], which, kind, 1.0, row))
+            sums.terms.append((codes.HIGHER_PAIR, *pair, which, kind, 1.0, row))
             sums.close(connection, name, 0.0, markers.length if lengths else 1.0)
 
     for point in model.points_on_curves.values():
@@ -58,7 +73,13 @@ def add_higher_pairs(
     for pair in model.curves_on_curves.values():
         row = _add_curve_on_curve(model, markers, table, pair, len(sums.program))
         hold("CVCV", pair.id, row, codes.CURVE_ON_CURVE)
-    return table
+    for held in model.points_on_surfaces.values():
+        row = len(surfaces.patches)
+        _add_point_on_surface(model, markers, surfaces, held, functions)
+        surfaces.equation.append(len(sums.program))
+        hold("PTSF", held.id, row, codes.POINT_ON_SURFACE)
+    made, along = table.arrays()
+    return made, surfaces.arrays(), np.concatenate([along, np.array(surfaces.along)])
 
 
 def _global(markers: MarkerTable, marker_id: int | None, place: tuple[float, ...]) -> Array:
@@ -119,6 +140,33 @@ def _add_curve_on_curve(
     frames = markers.frame(i), markers.frame(j)
     table.along[row : row + 2] = _touch_near(made, frames, begins)
     return row
+
+
+def _add_point_on_surface(
+    model: Model,
+    markers: MarkerTable,
+    table: SurfaceTable,
+    point: PointOnSurface,
+    functions: Mapping[int, Function] | None,
+) -> None:
+    """Add a surface that holds a point; where no functions are known it is one that is not used."""
+    i, j = markers.row(point.i_marker_id), markers.row(point.j_marker_id)
+    near, _ = markers.frame(i)
+    if point.start is not None:
+        near = _global(markers, point.start_marker_id, point.start)
+    surface = model.surfaces[point.surface_id]
+    patches = UNKNOWN
+    if functions is not None:
+        try:
+            patches = patches_of(surface, functions[surface.id])
+        except UnfitSurfaceError as error:
+            name = element_name(model.file, "Reference_ParamSurface", surface.id)
+            place = surface.source.file, surface.source.line
+            raise DeckError([Fault(*place, name, f"{surface.user.fnc_name} {error}")]) from None
+    table.patches.append(patches)
+    table.closed.append((surface.is_u_closed, surface.is_v_closed))
+    table.markers.append((i, j))
+    table.along.extend(nearest_corner(patches, _seen_from(markers, j, near)))
 
 
 def _fault(model: Model, pair: CurveOnCurve, message: str) -> DeckError:

@@ -8,18 +8,19 @@ of terms (`constraints.equations`).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from mbsim.arrays import codes
-from mbsim.arrays.model import Connections, Curves, Equations, Tree
+from mbsim.arrays.model import Connections, Curves, Equations, Surfaces, Tree
 from mbsim.arrays.scratch import Sweep
 from mbsim.compile_model.equation_sums import Sums
 from mbsim.compile_model.higher_pairs import add_higher_pairs
 from mbsim.compile_model.markers import MarkerTable
+from mbsim.compile_model.param_surfaces import Function
 from mbsim.compile_model.programs import ProgramTable
 from mbsim.compile_model.tree import (
     AXES,
@@ -86,7 +87,8 @@ class Mechanism:
     elements: list[tuple[str, int]]
     names: list[str]
     curves: Curves
-    along: np.ndarray  # (curves,) parameters at the start
+    surfaces: Surfaces
+    along: np.ndarray  # (curves + 2 surfaces,) parameters at the start
 
 
 class RigidSlot(NamedTuple):
@@ -399,8 +401,9 @@ def constrain(
     markers: MarkerTable,
     programs: ProgramTable,
     rigid_slots: Sequence[RigidSlot] = (),
+    surfaces: Mapping[int, Function] | None = None,
 ) -> Mechanism:
-    """Return the constraints of a model."""
+    """Return the constraints of a model; `surfaces`: what gives points of each, if known."""
     builder = _Builder(model, markers, programs)
     for joint in model.joints.values():
         builder.add_joint("JOINT", joint)
@@ -412,7 +415,7 @@ def constrain(
         builder.add_motion(motion)
     for constraint in model.general_constraints.values():
         builder.add_general(constraint)
-    curves = add_higher_pairs(model, markers, builder.sums, builder.connect)
+    pairs_of = add_higher_pairs(model, markers, builder.sums, builder.connect, surfaces)
     # friction is held by none of the tree, and its equations are the last
     rigid = rigid_forces(model)
     held = [marker for _, f in rigid for marker in (f.i_marker_id, f.j_marker_id)]
@@ -438,7 +441,7 @@ def constrain(
         connections,
         builder.elements,
         builder.sums.names,
-        *curves.arrays(),
+        *pairs_of,
     )
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbsim.arrays.model import Residuals, Users
+from mbsim.compile_model.param_surfaces import Function
 from mbsim.model.elements import Model
 from mbsim.model.subroutines import wanted
 
@@ -32,6 +33,7 @@ class UserCode:
     posts: list[ContactPost]
     subroutines: dict[tuple[str, int], UserSubroutine]  # in place of expressions, row by row
     residuals: dict[int, UserResidual]  # by Force_Element
+    surfaces: dict[int, Function]  # what gives points of each
 
     @property
     def laws_look(self) -> bool:
@@ -152,6 +154,23 @@ def _load_residuals(
     }
 
 
+def _load_surfaces(
+    model: Model,
+    plugins: Sequence[Path],
+    log: Callable[[str], None] | None,
+    scripts: dict[Path, Script],
+) -> dict[int, Function]:
+    """Load the users' SURSUBs of surfaces that hold points."""
+    asked = {point.surface_id for point in model.points_on_surfaces.values()}
+    if not asked:
+        return {}
+    from mbsim.plugins.shapes import load_surface
+    from mbsim.plugins.subroutine import begin_run
+
+    begin_run(log)
+    return {id: load_surface(model.surfaces[id], plugins, scripts, model.file) for id in asked}
+
+
 def load_user_code(
     model: Model,
     plugins: Sequence[Path],
@@ -172,6 +191,7 @@ def load_user_code(
         _load_posts(model, plugins, log, scripts),
         _load_subroutines(model, plugins, log, scripts),
         _load_residuals(model, plugins, interpret, log, scripts),
+        _load_surfaces(model, plugins, log, scripts),
     )
 
 

@@ -28,8 +28,8 @@ class Code(IntEnum):
     SINGULAR = 51  # `factor`: there is no solution, or too many
     STOPPED_BY_USER = 100
     NOT_REPEATED = 101  # f at a point differs each time it is asked for
-    END_OF_CURVE = 102  # a point that a curve holds has come to where that ends
-    NO_ONE_TOUCH = 103  # two curves that touch have no one point in which they do
+    END_OF_CURVE = 102  # a higher pair has come to where a curve or surface ends
+    NO_ONE_TOUCH = 103  # a higher pair has no one point in which it touches
 
 
 #: Codes from here on end the run without another try.

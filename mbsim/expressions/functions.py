@@ -271,6 +271,7 @@ _element("JPRIM", JPRIM="of a joint primitive")
 _element("MOTION", MOTION="of a motion")
 _element("PTCV", PTCV="of a curve on the point that it holds")
 _element("CVCV", CVCV="of a curve on one that touches it")
+_element("PTSF", PTSF="of a surface on the point that it holds")
 for _name in FORCES:
     _about = f"of a {FORCES[_name].statement}"
     _element(_name, **dict.fromkeys(FORCES[_name].functions.split(), _about))

@@ -1,10 +1,10 @@
-"""Curves in space, and what stays on them, in the deck's own words and units."""
+"""Curves and surfaces in space, and what stays on them, in the deck's own words and units."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from mbsim.model.source import Source
+from mbsim.model.source import Source, Subroutine
 
 
 @dataclass(frozen=True)
@@ -63,10 +63,46 @@ class CurveOnCurve:
     source: Source = Source()
 
 
+@dataclass(frozen=True)
+class ParamSurface:
+    """Reference_ParamSurface: a surface that a user's function gives, in the axes of a marker.
+
+    `u`, `v` are where its parameters begin and end.
+    """
+
+    id: int
+    u: tuple[float, float]
+    v: tuple[float, float]
+    user: Subroutine
+    is_u_closed: bool = False
+    is_v_closed: bool = False
+    label: str = ""
+    source: Source = Source()
+
+
+@dataclass(frozen=True)
+class PointOnSurface:
+    """Constraint_PTSF: the origin of marker I stays on a surface in the axes of J.
+
+    `start` is near where on the surface it begins, in the axes of a marker [L]; None: where I is.
+    """
+
+    id: int
+    i_marker_id: int
+    j_marker_id: int
+    surface_id: int
+    start: tuple[float, float, float] | None = None
+    start_marker_id: int | None = None
+    label: str = ""
+    source: Source = Source()
+
+
 @dataclass(frozen=True, kw_only=True)
 class HigherPairs:
-    """Curves of a model by id, and what stays on them."""
+    """Curves and surfaces of a model by id, and what stays on them."""
 
     points_on_curves: dict[int, PointOnCurve] = field(default_factory=dict)
     curves_on_curves: dict[int, CurveOnCurve] = field(default_factory=dict)
     curves: dict[int, ParamCurve] = field(default_factory=dict)
+    points_on_surfaces: dict[int, PointOnSurface] = field(default_factory=dict)
+    surfaces: dict[int, ParamSurface] = field(default_factory=dict)

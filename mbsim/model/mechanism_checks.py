@@ -21,6 +21,7 @@ STATEMENTS = {
     "MOTION": "Motion_Joint",
     "PTCV": "Constraint_PTCV",
     "CVCV": "Constraint_CVCV",
+    "PTSF": "Constraint_PTSF",
     **{name: FORCES[name].statement for name in FORCES},
     "CONTACT": "Force_Contact",
     "VARIABLE": "Reference_Variable",
@@ -62,12 +63,14 @@ def tables(model: Model) -> dict[str, Mapping[int, Any]]:
         "Constraint_General": model.general_constraints,
         "Constraint_PTCV": model.points_on_curves,
         "Constraint_CVCV": model.curves_on_curves,
+        "Constraint_PTSF": model.points_on_surfaces,
         "Motion_Joint": model.motions,
         **{FORCES[name].statement: model.table(name) for name in FORCES},
         "Reference_Variable": model.variables,
         "Control_Diff": model.differentials,
         "Reference_Spline": model.splines,
         "Reference_ParamCurve": model.curves,
+        "Reference_ParamSurface": model.surfaces,
         "Reference_Array": model.arrays,
         "Sensor_Event": model.sensors,
         "Sensor_Evaluate": model.evaluations,
@@ -96,12 +99,14 @@ def wanted(model: Model) -> Iterator[Wanted]:
     for statement, pairs, attributes in (
         ("Constraint_PTCV", model.points_on_curves, ("curve_id",)),
         ("Constraint_CVCV", model.curves_on_curves, ("i_curve_id", "j_curve_id")),
+        ("Constraint_PTSF", model.points_on_surfaces, ("surface_id",)),
     ):
         for pair in pairs.values():
             for attribute in attributes:
                 id = getattr(pair, attribute) or None
                 name = f"{statement}[{pair.id}]"
-                yield pair.source, name, attribute, id, "Reference_ParamCurve"
+                kind = "Surface" if attribute == "surface_id" else "Curve"
+                yield pair.source, name, attribute, id, f"Reference_Param{kind}"
     for request in model.requests.values():
         if request.elem_type and request.elem_id:
             statement = STATEMENTS[request.elem_type]

@@ -25,6 +25,7 @@ _TABLES: Mapping[str, tuple[str, ...]] = {
     "GCON": ("general_constraints",),
     "PTCV": ("points_on_curves",),
     "CVCV": ("curves_on_curves",),
+    "PTSF": ("points_on_surfaces",),
     "GFORCE": ("VECTORFORCE", "BODYFORCE"),
     "JOINT": ("joints",),
     "JPRIM": ("primitives",),
@@ -44,6 +45,7 @@ _STATEMENTS = {
     "general_constraints": "Constraint_General",
     "points_on_curves": "Constraint_PTCV",
     "curves_on_curves": "Constraint_CVCV",
+    "points_on_surfaces": "Constraint_PTSF",
     "joints": "Constraint_Joint",
     "primitives": "Constraint_Jprim",
     "motions": "Motion_Joint",
@@ -52,7 +54,7 @@ _STATEMENTS = {
 TYPES = spellings(**dict.fromkeys(_TABLES, ""))
 TYPES_NOT_BUILT = spellings(
     **dict.fromkeys(
-        "CVSF DIFF GEAR GSE LSE MATE MFORCE PFORCE PTDCV PTDSF PTDSFF PTSF SFSF "
+        "CVSF DIFF GEAR GSE LSE MATE MFORCE PFORCE PTDCV PTDSF PTDSFF SFSF "
         "TFSISO UCON YFORCE".split(),
         "",
     )

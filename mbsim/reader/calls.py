@@ -28,6 +28,7 @@ _NAMED_BY = {
     "array": ("Reference_Array",),
     **dict.fromkeys(("matrix", "mtx", "kmtx", "cmtx"), ("Reference_Matrix",)),
     "curve": ("Reference_ParamCurve",),
+    "surface": ("Reference_ParamSurface",),
     **dict.fromkeys(("joint1", "joint2", "joint3"), ("Constraint_Joint",)),
     "pinput": ("Control_PlantInput",),
     "poutput": ("Control_PlantOutput",),

@@ -14,7 +14,7 @@ from mbsim.reader.kinds import COUNT, FLAG, ID, REAL, REALS, TEXT
 from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 from mbsim.reader.subroutine import USERSUB
 
-_START = ("disp_x0", "disp_y0", "disp_z0")
+START = ("disp_x0", "disp_y0", "disp_z0")
 _START_I = ("i_disp_x0", "i_disp_y0", "i_disp_z0")
 _START_J = ("j_disp_x0", "j_disp_y0", "j_disp_z0")
 #: Points that lie nearer to each other than this part of the curve's extent are one.
@@ -87,7 +87,7 @@ def complete_curves(draft: Draft) -> Iterator[Fault]:
             )
 
 
-def _start(entry: Entry, names: tuple[str, str, str]) -> tuple[float, float, float] | None:
+def start_of(entry: Entry, names: tuple[str, str, str]) -> tuple[float, float, float] | None:
     """Return near where on a curve a pair begins, None where it is not given."""
     given, (x, y, z) = entry.those(names), names
     if given and len(given) < 3:
@@ -103,7 +103,7 @@ def _build_point(entry: Entry) -> None:
         i_marker_id=entry.get("i_marker_id", 0),
         j_marker_id=entry.get("j_marker_id", 0),
         curve_id=entry.get("curve_id", 0),
-        start=_start(entry, _START),
+        start=start_of(entry, START),
         label=entry.get("label", ""),
         source=entry.source,
     )
@@ -124,9 +124,9 @@ def _build_touching(entry: Entry) -> None:
         j_marker_id=j,
         i_curve_id=entry.get("i_curve_id", 0),
         j_curve_id=entry.get("j_curve_id", 0),
-        i_start=_start(entry, _START_I),
+        i_start=start_of(entry, _START_I),
         i_start_marker_id=i,
-        j_start=_start(entry, _START_J),
+        j_start=start_of(entry, _START_J),
         j_start_marker_id=j,
         label=entry.get("label", ""),
         source=entry.source,
@@ -162,7 +162,7 @@ CONSTRAINT_PTCV = Statement(
         "curve_id": Spec(ID, "the Reference_ParamCurve", required=True),
         **{
             name: Spec(REAL, "near where on the curve it begins, global", "L", "where I is")
-            for name in _START
+            for name in START
         },
         "vel_0": Spec(REAL, note="velocities at the start are those of the bodies"),
     },

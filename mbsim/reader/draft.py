@@ -7,7 +7,13 @@ from pathlib import Path
 
 from mbsim.errors import Fault
 from mbsim.model import elements as el
-from mbsim.model.curves import CurveOnCurve, ParamCurve, PointOnCurve
+from mbsim.model.curves import (
+    CurveOnCurve,
+    ParamCurve,
+    ParamSurface,
+    PointOnCurve,
+    PointOnSurface,
+)
 from mbsim.reader.linear_systems import ControlDraft
 from mbsim.reader.parse import Node
 
@@ -69,6 +75,8 @@ class Draft:
     general_constraints: dict[int, el.GeneralConstraint] = field(default_factory=dict)
     points_on_curves: dict[int, PointOnCurve] = field(default_factory=dict)
     curves_on_curves: dict[int, CurveOnCurve] = field(default_factory=dict)
+    points_on_surfaces: dict[int, PointOnSurface] = field(default_factory=dict)
+    surfaces: dict[int, ParamSurface] = field(default_factory=dict)
     scalar_forces: dict[int, el.ScalarForce] = field(default_factory=dict)
     marker_forces: dict[str, dict[int, el.MarkerForce]] = field(default_factory=dict)
     multi_points: dict[int, MultiPointDraft] = field(default_factory=dict)

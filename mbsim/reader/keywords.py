@@ -67,6 +67,7 @@ FORCE_ELEMENTS = spellings(
     MOTION="MOTION_JOINT MOTION_MARKER",
     PTCV="CONSTRAINT_PTCV",
     CVCV="CONSTRAINT_CVCV",
+    PTSF="CONSTRAINT_PTSF",
     **{name: f"{kind.statement} {kind.spellings}" for name in FORCES if (kind := FORCES[name])},
     CONTACT="FORCE_CONTACT",
 )

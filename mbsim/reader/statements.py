@@ -38,6 +38,7 @@ from mbsim.reader.parse import Node
 from mbsim.reader.points import BODY_POINT
 from mbsim.reader.requests import POST_REQUEST
 from mbsim.reader.statement import Statement
+from mbsim.reader.surfaces import CONSTRAINT_PTSF, REFERENCE_PARAM_SURFACE
 from mbsim.reader.tables import REFERENCE_ARRAY, REFERENCE_SPLINE
 from mbsim.reader.variable import REFERENCE_VARIABLE
 
@@ -59,6 +60,7 @@ STATEMENTS = (
     CONSTRAINT_GENERAL,
     CONSTRAINT_PTCV,
     CONSTRAINT_CVCV,
+    CONSTRAINT_PTSF,
     CONSTRAINT_GEAR,
     MOTION_JOINT,
     MOTION_MARKER,
@@ -74,6 +76,7 @@ STATEMENTS = (
     REFERENCE_ARRAY,
     REFERENCE_MATRIX,
     REFERENCE_PARAM_CURVE,
+    REFERENCE_PARAM_SURFACE,
     REFERENCE_2D_CLUSTER,
     SUBSYSTEM_PLANAR,
     SENSOR_EVENT,

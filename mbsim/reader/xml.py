@@ -320,6 +320,8 @@ def _to_model(draft: Draft, deck: Path, sha256: str) -> el.Model:
         general_constraints=draft.general_constraints,
         points_on_curves=draft.points_on_curves,
         curves_on_curves=draft.curves_on_curves,
+        points_on_surfaces=draft.points_on_surfaces,
+        surfaces=draft.surfaces,
         scalar_forces=draft.scalar_forces,
         marker_forces=draft.marker_forces,
         vector_forces=draft.vector_forces,

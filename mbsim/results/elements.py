@@ -35,11 +35,14 @@ GROUPS = {
     ),
     "PTCV": Group("points_on_curves", "points_on_curves", "point on a curve", "Constraint_PTCV"),
     "CVCV": Group("curves_on_curves", "curves_on_curves", "curve on a curve", "Constraint_CVCV"),
+    "PTSF": Group(
+        "points_on_surfaces", "points_on_surfaces", "point on a surface", "Constraint_PTSF"
+    ),
     **{name: Group(name, k.path, k.title, k.statement) for name in FORCES if (k := FORCES[name])},
     "CONTACT": Group("contacts", "contacts", "contact", "Force_Contact"),
 }
 #: Those that hold degrees of freedom, then those that push.
-CONSTRAINTS = ("JOINT", "JPRIM", "COUPLER", "MOTION", "GCON", "PTCV", "CVCV")
+CONSTRAINTS = ("JOINT", "JPRIM", "COUPLER", "MOTION", "GCON", "PTCV", "CVCV", "PTSF")
 APPLIED = tuple(FORCES)
 
 
@@ -90,4 +93,5 @@ def equations(model: Model) -> int:
         for joint in (*model.joints.values(), *model.primitives.values())
     )
     held += 2 * len(model.points_on_curves) + 3 * len(model.curves_on_curves)
+    held += len(model.points_on_surfaces)
     return held + len(model.couplers) + len(model.motions) + len(model.general_constraints)

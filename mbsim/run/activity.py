@@ -37,6 +37,7 @@ CONNECTIONS = {
     "GCON": "general_constraints",
     "PTCV": "points_on_curves",
     "CVCV": "curves_on_curves",
+    "PTSF": "points_on_surfaces",
 }
 _OF_APPLIED = ("form", "program", "components", "connection", "law", "by_reactions")
 _OF_SENSORS = ("program", "compare", "value", "located")

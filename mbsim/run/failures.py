@@ -223,28 +223,39 @@ def _unsolved(system: System, t: float) -> str:
 
 
 def _at_end(system: System, t: float) -> str:
-    """Return which higher pair has come to the end of a curve."""
+    """Return which higher pair has come to the end of a curve or surface."""
     scene = system.scene
-    curves, along = scene.curves, scene.state.along
+    curves, along, equations = scene.curves, scene.state.along, scene.equations
     last = curves.first[1:] - 1
-    out = (along < curves.begin[curves.first[:-1]]) | (
-        along > curves.begin[last] + curves.length[last]
+    alongside = along[: len(last)]
+    out = (alongside < curves.begin[curves.first[:-1]]) | (
+        alongside > curves.begin[last] + curves.length[last]
     )
-    holds = (curves.closed == 0) & (scene.equations.off[curves.equation] == 0)
-    row = int(np.flatnonzero(out & holds)[0])
-    pair = int(scene.equations.connection[curves.equation[row]])
-    curve = ("its curve", "the curve of I", "the curve of J")[curves.touching[row]]
+    rows = np.flatnonzero(out & (curves.closed == 0) & (equations.off[curves.equation] == 0))
+    if len(rows) > 0:
+        pair = int(equations.connection[curves.equation[rows[0]]])
+        what = ("its curve", "the curve of I", "the curve of J")[curves.touching[rows[0]]]
+    else:
+        surfaces = scene.surfaces
+        low, high = surfaces.start, surfaces.start + surfaces.spans - 1
+        foot = along[len(last) :].reshape(-1, 2)
+        ends = surfaces.begin[high] + surfaces.length[high]
+        left = ((foot < surfaces.begin[low]) | (foot > ends)) & (surfaces.closed == 0)
+        holds = equations.off[surfaces.equation] == 0
+        row = int(np.flatnonzero(left.any(axis=1) & holds)[0])
+        pair, what = int(equations.connection[surfaces.equation[row]]), "its surface"
     return (
-        f"{system.connection_name(pair)} comes to an end of {curve} at time {t:.9g} and has "
+        f"{system.connection_name(pair)} comes to an end of {what} at time {t:.9g} and has "
         "nowhere to go; results up to there are kept"
     )
 
 
 def _touches_nowhere(system: System, t: float) -> str:
-    """Return that curves that touch have no one point in which they do."""
-    pairs = [k for k, (statement, _) in enumerate(system.connections) if statement == "CVCV"]
+    """Return that a higher pair has no one point in which it touches."""
+    of = ("CVCV", "PTSF")
+    pairs = [k for k, (statement, _) in enumerate(system.connections) if statement in of]
     names = " or ".join(map(system.connection_name, pairs))
     return (
-        f"{names}: the curves have no one point of contact at time {t:.9g}: none is found next to "
-        "the last one, or both are equally bent there; results up to there are kept"
+        f"{names}: no one point of contact at time {t:.9g}: none is found next to the last one, or "
+        "curves are equally bent there, or a surface has no normal; results up to there are kept"
     )

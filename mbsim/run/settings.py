@@ -249,6 +249,7 @@ def _refuse_verlet(model: Model) -> None:
         ("Constraint_General", model.general_constraints, held),
         ("Constraint_PTCV", model.points_on_curves, held),
         ("Constraint_CVCV", model.curves_on_curves, held),
+        ("Constraint_PTSF", model.points_on_surfaces, held),
         *((name, table, whys[form]) for name, table, form in forces if form in whys),
         (
             "Control_Diff",

@@ -11,7 +11,7 @@ import math
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import cross, dot, scale, sub
+from mbsim.core.rotation import add, cross, dot, scale, sub
 from mbsim.dynamics.bodies.markers import marker_axis, marker_point
 
 #: Most corrections of a parameter.
@@ -21,7 +21,24 @@ _ENOUGH = 1e-14
 #: Rounding changes it by less than this part.
 _SMALL = 1e-9
 #: A second slope of the distance below this part of that of a straight line is none.
-_LEAST = 0.1
+LEAST = 0.1
+
+
+@jitable
+def span_at(
+    begins: F1, lengths: F1, low: int, high: int, closed: int, u: float
+) -> tuple[int, float]:
+    """Return which span from `low` to `high` u is in, and how far behind its begin."""
+    begin, end = begins[low], begins[high] + lengths[high]
+    if closed == 1:
+        u -= math.floor((u - begin) / (end - begin)) * (end - begin)
+    while low < high:
+        middle = (low + high + 1) // 2
+        if u >= begins[middle]:
+            low = middle
+        else:
+            high = middle - 1
+    return low, u - begins[low]
 
 
 @jitable
@@ -32,16 +49,7 @@ def piece_at(scene: Scene, c: int, u: float) -> tuple[int, float]:
     """
     curves = scene.curves
     low, high = curves.first[c], curves.first[c + 1] - 1
-    begin, end = curves.begin[low], curves.begin[high] + curves.length[high]
-    if curves.closed[c] == 1:
-        u -= math.floor((u - begin) / (end - begin)) * (end - begin)
-    while low < high:
-        middle = (low + high + 1) // 2
-        if u >= curves.begin[middle]:
-            low = middle
-        else:
-            high = middle - 1
-    return low, u - curves.begin[low]
+    return span_at(curves.begin, curves.length, low, high, curves.closed[c], u)
 
 
 @jitable
@@ -87,7 +95,7 @@ def nearest_parameter(scene: Scene, c: int, d: V3) -> float:
         straight = dot(dx, dx)
         bent = straight - dot(r, ddx)
         longest = longest_change(scene, c, u)
-        part = dot(r, dx) / (bent if bent > _LEAST * straight else straight) / longest
+        part = dot(r, dx) / (bent if bent > LEAST * straight else straight) / longest
         part = min(1.0, max(-1.0, part))
         u += part * longest
         if settled(abs(part), before):
@@ -97,10 +105,17 @@ def nearest_parameter(scene: Scene, c: int, d: V3) -> float:
 
 
 @jitable
-def seen_from(scene: Scene, y: F1, c: int) -> V3:
-    """Return where the point that curve c holds is, in J's axes."""
-    j = scene.curves.j[c]
-    d = sub(marker_point(scene, y, scene.curves.i[c]), marker_point(scene, y, j))
+def turned(scene: Scene, m: int, a: V3) -> V3:
+    """Return a vector in the axes of marker m as a global one."""
+    found = scale(a[0], marker_axis(scene, m, 0))
+    found = add(found, scale(a[1], marker_axis(scene, m, 1)))
+    return add(found, scale(a[2], marker_axis(scene, m, 2)))
+
+
+@jitable
+def seen_from(scene: Scene, y: F1, i: int, j: int) -> V3:
+    """Return where the origin of marker i is, in the axes of marker j."""
+    d = sub(marker_point(scene, y, i), marker_point(scene, y, j))
     return (
         dot(d, marker_axis(scene, j, 0)),
         dot(d, marker_axis(scene, j, 1)),

@@ -29,9 +29,15 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, scale, sub, vector
-from mbsim.dynamics.bodies.markers import marker_axis, marker_point, marker_velocity
+from mbsim.dynamics.bodies.markers import marker_point, marker_velocity
 from mbsim.dynamics.constraints.terms import add_side, centripetal
-from mbsim.dynamics.higher_pairs.curves import MOST, curve_point, longest_change, settled
+from mbsim.dynamics.higher_pairs.curves import (
+    MOST,
+    curve_point,
+    longest_change,
+    settled,
+    turned,
+)
 
 #: Curves are equally bent where the difference of curvatures times a piece's length is below this.
 _TOUCHES = 1e-8
@@ -51,14 +57,6 @@ class Touch(NamedTuple):
     y2: V3
     y3: V3
     b: V3
-
-
-@jitable
-def turned(scene: Scene, m: int, a: V3) -> V3:
-    """Return a vector in the axes of marker m as a global one."""
-    found = scale(a[0], marker_axis(scene, m, 0))
-    found = add(found, scale(a[1], marker_axis(scene, m, 1)))
-    return add(found, scale(a[2], marker_axis(scene, m, 2)))
 
 
 @jitable

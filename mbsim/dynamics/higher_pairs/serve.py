@@ -11,6 +11,7 @@ from mbsim.arrays.codes import (
     PAIR_SECOND,
     PAIR_VALUE,
     POINT_ON_CURVE,
+    POINT_ON_SURFACE,
 )
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
@@ -23,6 +24,24 @@ from mbsim.dynamics.higher_pairs.curves_on_curves import (
     touches,
 )
 from mbsim.dynamics.higher_pairs.points_on_curves import point_on_curve_term
+from mbsim.dynamics.higher_pairs.points_on_surfaces import (
+    beyond_edge,
+    nearest_on_surface,
+    point_on_surface_term,
+)
+
+
+@jitable
+def nearest_of(scene: Scene, y: F1, c: int) -> float:
+    """Return at which parameter curve c is nearest to the point that it holds."""
+    return nearest_parameter(scene, c, seen_from(scene, y, scene.curves.i[c], scene.curves.j[c]))
+
+
+@jitable
+def nearest_foot(scene: Scene, y: F1, f: int) -> tuple[float, float]:
+    """Return at which parameters surface f is nearest to the point that it holds."""
+    surfaces = scene.surfaces
+    return nearest_on_surface(scene, f, seen_from(scene, y, surfaces.i[f], surfaces.j[f]))
 
 
 @jitable
@@ -33,8 +52,13 @@ def fill_pair(scene: Scene, k: int, anew: int, y: F1) -> None:
     G, found = scene.sweep.G[k], (0.0, 0.0, 0.0)
     if kind == POINT_ON_CURVE:
         if anew == 1:
-            located[row] = nearest_parameter(scene, row, seen_from(scene, y, row))
+            located[row] = nearest_of(scene, y, row)
         found = point_on_curve_term(scene, y, row, which, G)
+    elif kind == POINT_ON_SURFACE:
+        if anew == 1:
+            at = len(scene.curves.i) + 2 * row
+            located[at], located[at + 1] = nearest_foot(scene, y, row)
+        found = point_on_surface_term(scene, y, row, G)
     else:
         if anew == 1:
             located[row], located[row + 1] = locate_touch(scene, y, row)
@@ -52,7 +76,7 @@ def commit_pairs(scene: Scene, y: F1) -> int:
     curves, along = scene.curves, scene.state.along
     for c in range(len(curves.closed)):
         if curves.touching[c] == 0:
-            along[c] = nearest_parameter(scene, c, seen_from(scene, y, c))
+            along[c] = nearest_of(scene, y, c)
         elif curves.touching[c] == 1:
             s, u = locate_touch(scene, y, c)
             lasts = scene.equations.off[curves.equation[c]] == 0
@@ -63,5 +87,14 @@ def commit_pairs(scene: Scene, y: F1) -> int:
             if lasts and not touches(scene, y, c):
                 return Code.NO_ONE_TOUCH
         if beyond_end(scene, c, along[c]):
+            return Code.END_OF_CURVE
+    for f in range(len(scene.surfaces.i)):
+        at = len(curves.closed) + 2 * f
+        s, u = nearest_foot(scene, y, f)
+        if math.isfinite(s):
+            along[at], along[at + 1] = s, u
+        elif scene.equations.off[scene.surfaces.equation[f]] == 0:
+            return Code.NO_ONE_TOUCH
+        if beyond_edge(scene, f):
             return Code.END_OF_CURVE
     return 0

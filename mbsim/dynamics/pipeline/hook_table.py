@@ -223,8 +223,12 @@ def _dry(scene: Scene) -> Callable[..., Any]:
     return of.serve_rigid_alone if rigid else of.serve_dry_alone
 
 
+def _has_pairs(scene: Scene) -> bool:
+    return len(scene.curves.i) + len(scene.surfaces.i) > 0
+
+
 def _has_ways(scene: Scene, method: Method) -> bool:
-    return len(scene.angles.i) + len(scene.curves.i) > 0
+    return len(scene.angles.i) > 0 or _has_pairs(scene)
 
 
 TABLE = (
@@ -342,7 +346,7 @@ TABLE = (
     Row(
         Hook.HIGHER_PAIRS,
         _INT(_INT, _INT, _INT, _PTR),  # context, term, 1 to find anew where it touches, y
-        _rows("curves", "i"),
+        lambda scene, method: _has_pairs(scene),
         _of("pipeline.force_hooks", "fill_higher_pair"),
         "fills a term of an equation of a higher pair",
         "0; it cannot fail",
@@ -458,9 +462,7 @@ TABLE = (
         Hook.ANGLES,
         _INT(_INT, _PTR),  # context, y
         _has_ways,
-        lambda of: _of(
-            "pipeline.force_hooks", ("commit_turns", "commit_ways")[len(of.curves.i) > 0]
-        )(of),
+        lambda of: _of("pipeline.force_hooks", ("commit_turns", "commit_ways")[_has_pairs(of)])(of),
         "counts the turns of angles, and follows higher pairs",
     ),
     Row(
