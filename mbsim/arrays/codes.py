@@ -102,6 +102,9 @@ OFFSET, PERP, ANGLE, DISTANCE, GENERAL, TOUCHING, TWIST, HIGHER_PAIR = range(8)
 # kinds of higher pairs: what is held on what
 POINT_ON_CURVE, CURVE_ON_CURVE, POINT_ON_SURFACE = range(3)
 
+# columns of `Surfaces.start` and its like
+ALONG_U, ALONG_V = range(2)
+
 # entries of `Sweep.pair`
 PAIR_VALUE, PAIR_RATE, PAIR_SECOND = range(3)
 

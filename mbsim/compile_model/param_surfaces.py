@@ -28,18 +28,19 @@ class UnfitSurfaceError(Exception):
 
 
 class Patches(NamedTuple):
-    """A surface: `begin` of spans along u and v, with the end, and `coefficient` of each patch.
+    """A surface: where spans along u and v begin, with the end, and `terms` of each patch.
 
     (spans along u, spans along v, 36, 3), row 6 n + m of powers n and m of u and v less where
     their spans begin.
     """
 
-    begin: tuple[Array, Array]
-    coefficient: Array
+    begin_u: Array
+    begin_v: Array
+    terms: Array
 
 
 #: Of a surface whose function is not called.
-UNKNOWN = Patches((np.array([0.0, 1.0]), np.array([0.0, 1.0])), np.zeros((1, 1, 36, 3)))
+UNKNOWN = Patches(np.array([0.0, 1.0]), np.array([0.0, 1.0]), np.zeros((1, 1, 36, 3)))
 
 
 def patches_of(surface: ParamSurface, function: Function) -> Patches:
@@ -65,10 +66,10 @@ def patches_of(surface: ParamSurface, function: Function) -> Patches:
         extent = float(np.linalg.norm(np.ptp(points.reshape(-1, 3), axis=0)))
         _close(surface, points, extent)
         patches = _spline(surface, (u, v), points)
-        between = [(each[:-1] + each[1:]) / 2.0 for each in (u, v)]
+        between_u, between_v = ((each[:-1] + each[1:]) / 2.0 for each in (u, v))
         off = 0.0
         for k in range(4 * spans):
-            a, b = between[0][k % spans], between[1][(3 * k + k // spans) % spans]
+            a, b = between_u[k % spans], between_v[(3 * k + k // spans) % spans]
             off = max(off, float(np.linalg.norm(_at(patches, a, b) - np.array(function(a, b)))))
         if off <= _ENOUGH * extent:
             return patches
@@ -97,7 +98,7 @@ def _spline(surface: ParamSurface, knots: tuple[Array, Array], points: Array) ->
     # (m, spans of v, n, spans of u, 3), with which powers of v came first
     coefficient = terms.transpose(3, 1, 2, 0, 4)
     pieces_u, pieces_v = coefficient.shape[:2]
-    return Patches((begin_u, begin_v), coefficient.reshape(pieces_u, pieces_v, 36, 3))
+    return Patches(begin_u, begin_v, coefficient.reshape(pieces_u, pieces_v, 36, 3))
 
 
 def _terms(knots: Array, values: Array, closed: bool) -> tuple[Array, Array]:
@@ -114,19 +115,20 @@ def _at(patches: Patches, u: float, v: float) -> Array:
     """Return the point (3,) of a surface."""
     k, m = (
         int(np.clip(np.searchsorted(begin, w, side="right") - 1, 0, len(begin) - 2))
-        for begin, w in zip(patches.begin, (u, v), strict=True)
+        for begin, w in zip((patches.begin_u, patches.begin_v), (u, v), strict=True)
     )
     powers = np.arange(_DEGREE + 1)
-    a, b = (u - patches.begin[0][k]) ** powers, (v - patches.begin[1][m]) ** powers
-    found: Array = np.outer(a, b).ravel() @ patches.coefficient[k, m]
+    a, b = (u - patches.begin_u[k]) ** powers, (v - patches.begin_v[m]) ** powers
+    found: Array = np.outer(a, b).ravel() @ patches.terms[k, m]
     return found
 
 
 def nearest_corner(patches: Patches, point: Array) -> tuple[float, float]:
     """Return the parameters of the corner of a patch that is next to a point, (3,)."""
-    off = np.linalg.norm(patches.coefficient[:, :, 0] - point, axis=-1)
+    corners = np.take(patches.terms, 0, axis=2)
+    off = np.linalg.norm(corners - point, axis=-1)
     k, m = np.unravel_index(np.argmin(off), off.shape)
-    return float(patches.begin[0][k]), float(patches.begin[1][m])
+    return float(patches.begin_u[k]), float(patches.begin_v[m])
 
 
 @dataclass
@@ -141,7 +143,7 @@ class SurfaceTable:
 
     def arrays(self) -> Surfaces:
         """Return the table."""
-        begins = [begin for each in self.patches for begin in each.begin]
+        begins = [begin for each in self.patches for begin in (each.begin_u, each.begin_v)]
         counts = np.array([len(begin) - 1 for begin in begins], dtype=np.int64).reshape(-1, 2)
         i, j = np.array(self.markers, dtype=np.int64).reshape(-1, 2).T
         ends = np.cumsum(counts.ravel()).reshape(-1, 2)
@@ -152,7 +154,7 @@ class SurfaceTable:
             begin=np.concatenate([np.zeros(0), *(begin[:-1] for begin in begins)]),
             length=np.concatenate([np.zeros(0), *(np.diff(begin) for begin in begins)]),
             coefficient=np.concatenate(
-                [np.zeros((0, 36, 3)), *(p.coefficient.reshape(-1, 36, 3) for p in self.patches)]
+                [np.zeros((0, 36, 3)), *(p.terms.reshape(-1, 36, 3) for p in self.patches)]
             ),
             closed=np.array(self.closed, dtype=np.int64).reshape(-1, 2),
             i=i.copy(),

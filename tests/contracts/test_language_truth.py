@@ -7,6 +7,7 @@ Derivatives by time are compared with high-order differences of the independent 
 from __future__ import annotations
 
 import functools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -31,7 +32,13 @@ from mbsim.expressions.functions import FUNCTIONS, Kind
 from mbsim.expressions.parse import parse
 from mbsim.forces.catalog import FORCES as KINDS
 from mbsim.model import elements as el
-from mbsim.model.curves import CurveOnCurve, ParamCurve, PointOnCurve
+from mbsim.model.curves import (
+    CurveOnCurve,
+    ParamCurve,
+    ParamSurface,
+    PointOnCurve,
+    PointOnSurface,
+)
 
 POINTS = 1000
 #: Of these, plain Python takes the first where it would take long.
@@ -406,7 +413,10 @@ PUSHES = {
     ("MOTION", 8): (31, 22),
     ("PTCV", 9): (22, 32),
     ("CVCV", 10): (32, 21),
+    ("PTSF", 11): (21, 32),
 }
+BOWL_FILE = str(Path(__file__).parents[1] / "corpus/bowl.py")
+BOWL = el.Subroutine((0.5,), "bowl", script_name=BOWL_FILE)
 ALONE, FLOATING = {("SFORCE", 3)}, {("VECTORFORCE", 5)}
 FORCES = {
     "scalar_forces": [
@@ -422,6 +432,12 @@ FORCES = {
     "motions": [el.Motion(8, "", None, 31, 22, "X", expr=parse("TIME"))],
     "points_on_curves": [PointOnCurve(9, 22, 32, 1)],
     "curves_on_curves": [CurveOnCurve(10, 32, 21, 2, 2)],
+    "points_on_surfaces": [PointOnSurface(11, 21, 32, 3)],
+    "surfaces": [
+        ParamSurface(
+            3, (0.0, 1.0), (0.0, 1.0), el.Subroutine((0.5,), "bowl", script_name=BOWL_FILE)
+        )
+    ],
     "curves": [
         ParamCurve(1, ((0.0, 0.0, 0.0), (1.0, 0.2, 0.0), (2.0, 0.0, 1.0), (3.0, 0.0, 0.0))),
         ParamCurve(2, ((0.0, 0.0, 0.0), (1.0, 1.0, 0.0), (2.0, 4.0, 0.0), (3.0, 9.0, 0.0))),

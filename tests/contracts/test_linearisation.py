@@ -317,13 +317,27 @@ EQUATIONS = {
         + '<Constraint_CVCV id="1" i_marker_id="102" i_curve_id="8" j_marker_id="101" '
         'j_curve_id="7"/>',
     ),
+    "a point on a surface": (
+        "SPHERICAL",
+        '<Reference_ParamSurface id="7" u_start="-2" u_end="2" v_start="-2" v_end="2" '
+        'usrsub_param_string="USER(1)" usrsub_fnc_name="saddle" script_name="saddle.py"/>'
+        '<Constraint_PTSF id="1" i_marker_id="102" j_marker_id="100" surface_id="7"/>',
+    ),
     "general on two": ("SPHERICAL", '<Constraint_General id="1" expr="DX(102,101,101) - 1"/>'),
 }
+
+
+#: A SURSUB through (1.3, -0.2, -0.1) or near it, in global axes.
+SADDLE = """
+def saddle(id, par, npar, u, v, iord, iflag):
+    return [1.3 + u, v - 0.2, -0.1 + 0.4 * u * u - 0.3 * u * v - 0.5 * v * v]
+"""
 
 
 @pytest.mark.parametrize("name", EQUATIONS)
 def test_equations(name, tmp_path):
     kind, text = EQUATIONS[name]
+    (tmp_path / "saddle.py").write_text(SADDLE)
     check(of(two(kind, extra=text), tmp_path), t=0.3)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from mbsim.arrays.codes import ALONG_U, ALONG_V
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
@@ -27,7 +28,7 @@ class Foot(NamedTuple):
 
 @jitable
 def span_of(scene: Scene, f: int, side: int, u: float) -> tuple[int, float]:
-    """Return the span of surface f along u (side 0) or v (1), and how far u is behind its begin."""
+    """Return the span of surface f along u or v, and how far u is behind its begin."""
     surfaces = scene.surfaces
     low = surfaces.start[f, side]
     high = low + surfaces.spans[f, side] - 1
@@ -38,9 +39,13 @@ def span_of(scene: Scene, f: int, side: int, u: float) -> tuple[int, float]:
 def surface_point(scene: Scene, f: int, u: float, v: float) -> Foot:
     """Return the point of surface f at parameters u and v."""
     surfaces = scene.surfaces
-    k, s = span_of(scene, f, 0, u)
-    m, r = span_of(scene, f, 1, v)
-    row = (k - surfaces.start[f, 0]) * surfaces.spans[f, 1] + m - surfaces.start[f, 1]
+    k, s = span_of(scene, f, ALONG_U, u)
+    m, r = span_of(scene, f, ALONG_V, v)
+    row = (
+        (k - surfaces.start[f, ALONG_U]) * surfaces.spans[f, ALONG_V]
+        + m
+        - surfaces.start[f, ALONG_V]
+    )
     p = surfaces.coefficient[surfaces.first[f] + row]
     zero = (0.0, 0.0, 0.0)
     x, xu, xv, xuu, xuv, xvv = zero, zero, zero, zero, zero, zero
@@ -82,8 +87,8 @@ def nearest_on_surface(scene: Scene, f: int, d: V3) -> tuple[float, float]:
         if be * bg - bm * bm > LEAST * plain and be > 0.0:
             e, g, mixed = be, bg, bm
         det = e * g - mixed * mixed
-        long_u = length[span_of(scene, f, 0, u)[0]]
-        long_v = length[span_of(scene, f, 1, v)[0]]
+        long_u = length[span_of(scene, f, ALONG_U, u)[0]]
+        long_v = length[span_of(scene, f, ALONG_V, v)[0]]
         du, dv = (g * fu - mixed * fv) / det / long_u, (e * fv - mixed * fu) / det / long_v
         most = max(abs(du), abs(dv))
         part = 1.0 if most <= 1.0 else 1.0 / most
