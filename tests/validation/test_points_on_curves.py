@@ -63,7 +63,7 @@ def helix(count):
     return np.column_stack([np.cos(angle), np.sin(angle), -0.2 * angle])
 
 
-@pytest.mark.parametrize("method", ["DOPRI5", "DOP853", "RADAU5", "GALPHA"])
+@pytest.mark.parametrize("method", ["DOPRI5", "DOP853", "RADAU5", "GALPHA", "MOREAU"])
 @pytest.mark.parametrize("quintic", [False, True])
 def test_a_bead_slides_down_a_helix(method, quintic, tmp_path):
     points = helix(40)
