@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +26,22 @@ from mbsim.cli.options import json_option
     help="Instead of standard output.",
 )
 @click.option(
+    "--every",
+    type=float,
+    metavar="DT",
+    help="At these times between the rows too: the run is made again.",
+)
+@click.option(
     "--no-scripts", "scripts", flag_value=False, default=True, help="Refuse decks with user code."
 )
 @json_option("one JSON object instead of CSV")
 def command(
-    result: Path, names: tuple[str, ...], output: Path | None, scripts: bool, as_json: bool
+    result: Path,
+    names: tuple[str, ...],
+    output: Path | None,
+    every: float | None,
+    scripts: bool,
+    as_json: bool,
 ) -> None:
     """Evaluate contact forces, and what is named by espy, again at the output times of RESULT.h5.
 
@@ -39,7 +51,8 @@ def command(
     K counting the incidents of the row from 0. Of other elements it is what rows have,
     Constraint_Joint[ID].force or Force_Element[ID].UNKNOWN, and what their subroutines name by
     espy, Force_Scalar_TwoBody[ID].name. /x, /y, /z or /mag after a vector takes one number
-    of it. The deck and users' files must be those of the run.
+    of it. The deck and users' files must be those of the run. With --every the run is made
+    again with rows so far apart [T], and the columns are of these rows.
     """
     from mbsim.cli.messages import print_json
     from mbsim.errors import ModelError
@@ -48,11 +61,13 @@ def command(
     from mbsim.results.form import finite
     from mbsim.results.reading import open_results
     from mbsim.run.replay import request
+    from mbsim.run.run_again import run_again
 
     if output is not None and as_json:
         raise ModelError("-o goes with CSV: take either -o or --json")
     with open_results(result) as results, no_scripts(not scripts):
-        time, columns = request(results, names)
+        with nullcontext(results) if every is None else run_again(results, every) as rows:
+            time, columns = request(rows, names)
     if as_json:
         print_json({"result_file": str(result), "time": time.tolist(), "signals": finite(columns)})
         return

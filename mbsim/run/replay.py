@@ -27,6 +27,7 @@ from mbsim.run.plants import with_plants
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
+    from mbsim.model.elements import Model
     from mbsim.results.reading import Results
 
 Array = np.ndarray[Any, Any]
@@ -76,8 +77,8 @@ class Row:
     espied: dict[tuple[str, int], dict[str, Any]] = field(default_factory=dict)
 
 
-def _deck(results: Results) -> str:
-    """Return the deck that a result file names, if it is still the same."""
+def deck_of(results: Results) -> str:
+    """Return the deck that a result file names; raise `ModelError` unless it is still the same."""
     import hashlib
 
     named = results.attributes
@@ -94,7 +95,8 @@ def _deck(results: Results) -> str:
     return str(deck)
 
 
-def _lines(text: Any) -> list[str]:
+def lines_of(text: Any) -> list[str]:
+    """Return what an attribute of a result file lists, a line each."""
     return str(text).split("\n") if str(text) else []
 
 
@@ -122,12 +124,12 @@ class Replay:
             )
         if "overrides" not in named:
             raise ModelError(f"{results.path}: an earlier version made it: run the model again")
-        model = read_model(_deck(results), _lines(named["overrides"]))
+        model = read_model(deck_of(results), lines_of(named["overrides"]))
         self.results = results
         # analyses of one time may all be at 0, which nobody asks for
         end = float(named["end_time"]) or None
         self.settings = settle(model, end, float(named["print_interval"]))
-        plugins = [Path(file) for file in _lines(named["plugins"])]
+        plugins = [Path(file) for file in lines_of(named["plugins"])]
         interpret, detector = bool(named["interpret_plugins"]), str(named["detector"])
         self.system: System = build(
             with_plants(model), plugins, interpret, detector, lambda line: None
@@ -401,6 +403,14 @@ def request(results: Results, names: Sequence[str]) -> tuple[Array, dict[str, li
         rows = list(again.rows()) if rows is None else rows
         return rows
 
+    def espied() -> list[Any]:
+        return [row.espied for row in replayed()]
+
+    def model() -> Model:
+        nonlocal again
+        again = again or Replay(results)
+        return again.system.model
+
     others = [name for name in names if not is_of_element(name)]
     if others:
         again = Replay(results)
@@ -409,7 +419,7 @@ def request(results: Results, names: Sequence[str]) -> tuple[Array, dict[str, li
     columns: dict[str, list[Value]] = {}
     for name in names:
         if is_of_element(name):
-            columns |= columns_of(results, name, lambda: [row.espied for row in replayed()])
+            columns |= columns_of(results, name, espied, model)
         else:
             found = replayed()
             assert again is not None

@@ -37,6 +37,8 @@ _AT_ONCE = ("STATIC", "LINEAR")
 TIGHTEST = 1e-15
 #: Of an Adams deck, so that its curves agree with Adams' own to the digits that those carry.
 DEFAULT_TOL_ADAMS = 1e-8
+#: Who says tol, where that is no deck.
+BY_CALLER = "as the command line says"
 #: What tol is of `integr_tol`: MotionSolve's default, 1e-3, is then the default.
 PER_TOL = 100.0
 INTEGRATORS = tuple(METHODS)
@@ -166,7 +168,7 @@ def _tolerance(model: Model, simulation: Simulation, tol: float | None) -> tuple
     """Return tol of one Simulate, checked, and who says it: the caller, the deck or nobody."""
     adams = is_adams(model.file)
     if tol is not None:
-        return _checked("tol", tol, TIGHTEST, 0.1), "as the command line says"
+        return _checked("tol", tol, TIGHTEST, 0.1), BY_CALLER
     for source, part in ((simulation.transient, "<Command>"), (model.transient, "<Model>")):
         if source is None or source.integr_tol is None:
             continue

@@ -7,6 +7,7 @@ import io
 import json
 import shutil
 
+import h5py
 import numpy as np
 import pytest
 from click.shell_completion import ShellComplete
@@ -17,6 +18,7 @@ from helpers.folders import MODELS, USERFUNCS
 from mbsim.cli.main import main
 from mbsim.errors import ModelError, ResultsError
 from mbsim.run.replay import Replay, request
+from mbsim.run.run_again import run_again
 
 SLIP = 'stiction_trans_vel="0.01" friction_trans_vel="0.02"'
 USER = 'cff_type="USERCFF" cff_fnc_name="CFFSUB" script_name="law.py"'
@@ -53,6 +55,16 @@ DECK = """<Deck><Model>
 FORCE = """<Force_Vector_OneBody id="5" type="ForceOnly" i_marker_id="20"
  fx_expression="6*sin(6*time)" fy_expression="2*sin(4*time)" fz_expression="0"/>"""
 USUAL = {"vx": 0, "spin": -20, "block": 0.05001, "ball": 0.15, "force": FORCE, "end": 0.4}
+SLIDER = """<Deck><Model>
+<Body_Rigid id="1" isground="TRUE"/>
+<Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="1" inertia_yy="1" inertia_zz="1"/>
+<Reference_Marker id="10" body_id="1"/><Reference_Marker id="20" body_id="2" pos_x="0.00045"/>
+<Force_Vector_OneBody id="5" type="ForceOnly" i_marker_id="20" fx_expression="-1e4*DX(20,10,10)"
+ fy_expression="0" fz_expression="0"/>
+<Force_DryFriction id="7" type="TX" i_marker_id="20" j_marker_id="10" friction="1" dx="1e-6"/>
+</Model><Command><Simulate analysis_type="Transient" end_time="0.12" print_interval="0.002"/>
+</Command></Deck>
+"""
 SPIED = """
 def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):
     v = hypot(xdot[0], xdot[1])
@@ -352,3 +364,49 @@ def test_signals_of_other_elements_and_what_their_subroutines_name(tmp_path):
         ):
             with pytest.raises(ModelError, match=said):
                 request(results, [name])
+
+
+@pytest.mark.parametrize(
+    ("friction", "method"), [("STICTION", "AUTO"), ("LUGRE", "RADAU5"), ("plugin", "DOPRI5")]
+)
+def test_between_rows_are_the_states_of_the_run(tmp_path, friction, method):
+    """Every third row of another run of its own is one of the first, to the last bit."""
+    names = ["Force_Contact[301].force", "Force_Contact[301].incident[0].slip"]
+    with run(tmp_path, FRICTIONS[friction], integrator=method) as results:
+        times, columns = request(results, names)
+        with run_again(results, 0.01 / 3.0) as rows:
+            nearer, more = request(rows, names)
+    np.testing.assert_allclose(nearer[::3], times, atol=1e-12)
+    for name in columns:
+        assert len(more[name]) == 3 * len(times) - 2
+        np.testing.assert_allclose(more[name][::3], columns[name], atol=1e-9)
+    assert more[f"{names[0]}/x"][-1] == columns[f"{names[0]}/x"][-1]
+
+
+def test_between_rows_nothing_is_known_of_a_run_that_ends_elsewhere_again(tmp_path):
+    """As one of a user's code that asks for chance."""
+    run(tmp_path, FRICTIONS["none"]).close()
+    file = tmp_path / "out" / "deck.h5"
+    with h5py.File(file, "r+") as stored:
+        stored["state/y"][-1, 0] += 1e-9
+    with mbsim.open_results(file) as results:
+        with pytest.raises(ModelError, match=r"not at time 0\.4 where it was"):
+            with run_again(results, 0.005):
+                pass
+        with pytest.raises(ModelError, match="--every 0: must be a time above 0"):
+            with run_again(results, 0.0):
+                pass
+
+
+def test_dry_friction_says_whether_it_sticks(tmp_path):
+    """A slider on a spring of 1e4 N/m with F = 1 N slips for two half periods, then holds."""
+    (tmp_path / "deck.xml").write_text(SLIDER)
+    with mbsim.simulate(tmp_path / "deck.xml", output=tmp_path / "out") as results:
+        _, columns = request(results, ["Force_DryFriction[7].mode"])
+        forces = np.abs(results["dry_frictions/7/force"][:, 0])
+        moving = np.abs(results["bodies/2/velocity"][:, 0]) > 5e-3
+    modes = np.array(columns["Force_DryFriction[7].mode"])
+    assert set(modes) == {"stick", "slip"}
+    assert (modes[moving] == "slip").all()
+    assert modes[-1] == "stick"
+    assert (forces[modes == "stick"] < 1.0).all()
