@@ -60,13 +60,13 @@ def command(
     from mbsim.results.files import replace_text
     from mbsim.results.form import finite
     from mbsim.results.reading import open_results
+    from mbsim.run.between_rows import rerun
     from mbsim.run.replay import request
-    from mbsim.run.run_again import run_again
 
     if output is not None and as_json:
         raise ModelError("-o goes with CSV: take either -o or --json")
     with open_results(result) as results, no_scripts(not scripts):
-        with nullcontext(results) if every is None else run_again(results, every) as rows:
+        with nullcontext(results) if every is None else rerun(results, every) as rows:
             time, columns = request(rows, names)
     if as_json:
         print_json({"result_file": str(result), "time": time.tolist(), "signals": finite(columns)})

@@ -100,7 +100,8 @@ def _dry_modes(results: Results, path: str, model: Model, id: int) -> list[Value
             f"Force_DryFriction[{id}].mode: not known where <Command> changes elements"
         )
     values = model.table(_KIND)[id].values
-    force = results[f"{path}torque" if values["type"][0] == "R" else f"{path}force"]
+    turns = str(values["type"]).startswith("R")
+    force = results[f"{path}torque" if turns else f"{path}force"]
     size = np.linalg.norm(np.atleast_2d(np.asarray(force, dtype=np.float64)), axis=1)
     slips = np.abs(size - values["friction"]) <= ROUNDED * values["friction"]
     return ["slip" if each else "stick" for each in slips]

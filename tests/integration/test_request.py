@@ -17,8 +17,8 @@ import mbsim
 from helpers.folders import MODELS, USERFUNCS
 from mbsim.cli.main import main
 from mbsim.errors import ModelError, ResultsError
+from mbsim.run.between_rows import rerun
 from mbsim.run.replay import Replay, request
-from mbsim.run.run_again import run_again
 
 SLIP = 'stiction_trans_vel="0.01" friction_trans_vel="0.02"'
 USER = 'cff_type="USERCFF" cff_fnc_name="CFFSUB" script_name="law.py"'
@@ -374,7 +374,7 @@ def test_between_rows_are_the_states_of_the_run(tmp_path, friction, method):
     names = ["Force_Contact[301].force", "Force_Contact[301].incident[0].slip"]
     with run(tmp_path, FRICTIONS[friction], integrator=method) as results:
         times, columns = request(results, names)
-        with run_again(results, 0.01 / 3.0) as rows:
+        with rerun(results, 0.01 / 3.0) as rows:
             nearer, more = request(rows, names)
     np.testing.assert_allclose(nearer[::3], times, atol=1e-12)
     for name in columns:
@@ -391,10 +391,10 @@ def test_between_rows_nothing_is_known_of_a_run_that_ends_elsewhere_again(tmp_pa
         stored["state/y"][-1, 0] += 1e-9
     with mbsim.open_results(file) as results:
         with pytest.raises(ModelError, match=r"not at time 0\.4 where it was"):
-            with run_again(results, 0.005):
+            with rerun(results, 0.005):
                 pass
         with pytest.raises(ModelError, match="--every 0: must be a time above 0"):
-            with run_again(results, 0.0):
+            with rerun(results, 0.0):
                 pass
 
 

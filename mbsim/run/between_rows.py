@@ -23,7 +23,7 @@ ASKS_WHERE_ROWS_ARE = "DOP853"
 
 
 @contextmanager
-def run_again(results: Results, every: float) -> Iterator[Results]:
+def rerun(results: Results, every: float) -> Iterator[Results]:
     """Yield results of the same run with rows every so often [T], in a folder that goes with them.
 
     Steps do not depend on rows, so these are states of the run itself, to the last bit. They do
