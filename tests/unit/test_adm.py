@@ -394,8 +394,8 @@ def test_names_the_fault(tmp_path: Path, name: str) -> None:
 
 
 def test_a_name_that_only_ends_alike_is_not_suggested(tmp_path: Path) -> None:
-    with pytest.raises(DeckError, match=r"unknown statement SOLVER$"):
-        read(tmp_path, added("SOLVER/1"))
+    with pytest.raises(DeckError, match=r"unknown statement SAMPLER$"):
+        read(tmp_path, added("SAMPLER/1"))
 
 
 def test_the_manual_has_a_deck_that_is_read(tmp_path: Path) -> None:

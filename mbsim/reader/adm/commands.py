@@ -172,7 +172,7 @@ COMMANDS = (
         decks.output_only(name, _OUTPUT)
         for name in (
             *("FILE", "OUTPUT", "RESULTS", "PREFERENCES", "DEBUG", "CONTROL", "INFO", "LIST"),
-            *("SHOW", "TIME", "IC"),
+            *("SHOW", "TIME", "IC", "KINEMATICS", "LSOLVER", "HELP"),
         )
     ),
     AdmStatement("STOP"),

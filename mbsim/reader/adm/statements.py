@@ -433,6 +433,10 @@ STATEMENTS = (
     CONTACT,
     FRICTION,
     output_only("IC", "joints are put together by mbsim's own iteration, to rounding"),
+    output_only("KINEMATICS", "positions are solved for to rounding at each time; it sets nothing"),
+    output_only("PREFERENCES", "it says how Adams is run; it sets nothing"),
+    output_only("LSOLVER", "mbsim has linear algebra of its own; it sets nothing"),
+    output_only("DEBUG", "it says what Adams prints; see the log"),
     output_only("MREQUEST", "no requests are made of it; positions of all bodies are kept"),
     output_only("OUTPUT", "result files are mbsim's own (HDF5 and CSV); it sets nothing"),
     output_only("RESULTS", "result files are mbsim's own (HDF5 and CSV); it sets nothing"),
@@ -444,7 +448,7 @@ BY_KEY = {fold(statement.name): statement for statement in STATEMENTS}
 # been built are none of them
 _DOCUMENTED = (
     "BEAM CONTACT COUPLER CURVE CVCV EQUILIBRIUM FIELD FLEX_BODY FRICTION GEAR "
-    "GSE IC KINEMATICS LSE MATRIX MFORCE NFORCE PINPUT POINT_MASS POUTPUT PREFERENCES "
-    "PTCV PTSF STRING SURFACE TFSISO TIRE UCON"
+    "GSE IC LSE MATRIX MFORCE NFORCE PINPUT POINT_MASS POUTPUT PTCV PTSF STRING SURFACE TFSISO "
+    "TIRE UCON"
 ).split()
 NOT_BUILT = [name for name in _DOCUMENTED if fold(name) not in BY_KEY]
