@@ -47,6 +47,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar, NamedTuple, Protocol
 
+import numpy as np
+
 from mbsim.core.jitable import jitable
 from mbsim.core.registry import Registry
 from mbsim.forces.formula import Vector
@@ -250,6 +252,10 @@ class OfResidual(Form):
 _ORDER = (Scalar, Expressed, Wrench, Components, MultiPoint, OfReactions, Switched, OfResidual)
 
 
+#: Of an element's values, and of its force and its torque at every row, (n, 3), a word a row.
+Told = Callable[[Values, np.ndarray, np.ndarray], list[str]]
+
+
 class ForceKind(NamedTuple):
     """A kind of applied forces; see `force`."""
 
@@ -267,6 +273,7 @@ class ForceKind(NamedTuple):
     spellings: str
     changes: tuple[str, ...]
     refused: Mapping[str, str]
+    told: Mapping[str, Told]
     about: str
 
 
@@ -305,6 +312,7 @@ def force(
     spellings: str = "",
     changes: str = "",
     refused: Mapping[str, str] | None = None,
+    told: Mapping[str, Told] | None = None,
     about: str = "",
 ) -> None:
     """Register a kind of forces.
@@ -340,6 +348,8 @@ def force(
         Attributes that may change between simulations.
     refused : mapping, optional
         Attributes that decks of others have and that are not taken, each with the reason.
+    told : mapping, optional
+        Words that `mbsim request` tells of each row, by the name of the signal: ``mode``.
     about : str, optional
         What it is, one line for the manual.
     """
@@ -361,6 +371,7 @@ def force(
         spellings,
         tuple(changes.split()),
         refused or {},
+        told or {},
         about,
     )
     FORCES.put(name, made)

@@ -31,6 +31,7 @@ from mbsim.reader.kinds import (
 from mbsim.reader.statement import MARKERS, NAMED, Entry, Spec, Statement
 from mbsim.reader.subroutine import GIVEN_BY, USERSUB, expression_or_user
 
+_COUSUB = "COUSUB is not built; give coefficients, or a Constraint_General with the relation"
 _NOT_BUILT = "is documented but not built yet"
 #: What only some joints have; DISTANCE may have a length, the others must have theirs.
 _OF_SOME_JOINTS = {"pitch": "SCREW", "pitch_diameter": "RACK_PINION", "length": "DISTANCE"}
@@ -261,7 +262,7 @@ CONSTRAINT_COUPLER = Statement(
         "motion_types": Spec(WORDS, "R or T, one for each joint, as a list"),
         "scales": Spec(REALS, "coefficients that go with joint_ids"),
         "is_virtual": Spec(FLAG, refused="virtual couplers are not built", harmless="false"),
-        **{name: Spec(refused="COUSUB is not built; give coefficients") for name in USERSUB},
+        **{name: Spec(refused=_COUSUB) for name in USERSUB},
     },
     _build_coupler,
     about="a linear relation between displacements of joints",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from mbsim.errors import Fault
@@ -12,6 +13,18 @@ from mbsim.model.source import Source
 
 if TYPE_CHECKING:
     from mbsim.reader.draft import Draft
+
+
+#: Types of what holds no expression: most of a deck is numbers and names.
+_PLAIN = frozenset((int, float, bool, str, type(None), Source))
+
+
+@cache
+def _fields(kind: type) -> tuple[str, ...]:
+    """Return the fields that a dataclass is made of, none of what is no dataclass."""
+    if not dataclasses.is_dataclass(kind):
+        return ()
+    return tuple(each.name for each in dataclasses.fields(kind) if each.init)
 
 
 class Rewriting:
@@ -49,22 +62,25 @@ class Rewriting:
             )
         if isinstance(value, (list, tuple)) and type(value) in (list, tuple):
             return self._kept(value, list(value), type(value))
-        if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        kind: Any = type(value)
+        names = _fields(kind)
+        if names:
             self.source = getattr(value, "source", self.source)
-            names = [each.name for each in dataclasses.fields(value) if each.init]
-            old = [getattr(value, name) for name in names]
-            made: Any = value
             return self._kept(
                 value,
-                old,
-                lambda new: dataclasses.replace(made, **dict(zip(names, new, strict=True))),
+                [getattr(value, name) for name in names],
+                lambda new: dataclasses.replace(value, **dict(zip(names, new, strict=True))),
             )
         return value
 
     def _kept(self, value: Any, old: list[Any], make: Callable[[list[Any]], Any]) -> Any:
         """Return what `make` makes of rewritten parts, the value itself where all are the same."""
-        new = [self(part) for part in old]
-        return value if all(a is b for a, b in zip(old, new, strict=True)) else make(new)
+        same, new = True, []
+        for part in old:
+            changed = part if type(part) in _PLAIN else self(part)
+            same = same and changed is part
+            new.append(changed)
+        return value if same else make(new)
 
     def node(self, node: Node) -> Node:
         """Return a tree with functions replaced."""

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mbsim.errors import ModelError
+from mbsim.forces.catalog import FORCES, ForceKind
 from mbsim.reader.keywords import fold
 from mbsim.results.elements import GROUPS
 from mbsim.results.names import PARTS, parts_of
@@ -26,11 +27,8 @@ if TYPE_CHECKING:
 Value = float | str
 #: What subroutines name at every row, by statement and id.
 Espied = Sequence[Mapping[tuple[str, int], Mapping[str, Value]]]
-#: Dry friction slips where its force is that of slip but for so many parts of it: it is turned into
-#: the global frame, and stored.
-ROUNDED = 1e-12
 _NAME = re.compile(r"([A-Za-z]\w*)\[(\d+)\]\.([A-Za-z_]\w*)(?:/(\w+))?")
-_CONTACT, _DRY, _KIND = "Force_Contact", "dry_frictions", "DRYFRICTION"
+_CONTACT = "Force_Contact"
 #: Groups of a result file by statements' names, folded.
 _PATHS = {fold(group.title): group.path for group in GROUPS.values() if group.title != _CONTACT}
 _PATHS |= {fold("Motion_Marker"): "motions", fold("Control_Diff"): "diffs"}
@@ -70,8 +68,10 @@ def columns_of(
     stored = {each[len(path) :]: n for each, n in signals.items() if each.startswith(path)}
     if signal in stored:
         return _stored(results, name.strip(), f"{path}{signal}", stored[signal], part or "")
-    if path.startswith(f"{_DRY}/") and signal == "mode" and stored and not part:
-        return {name.strip(): _dry_modes(results, path, model(), int(id))}
+    kinds = (FORCES[each] for each in FORCES)
+    kind = next((each for each in kinds if path == f"{each.path}/{id}/"), None)
+    if kind is not None and signal in kind.told and stored and not part:
+        return {name.strip(): _told(results, path, model(), kind, int(id), signal)}
     rows = espied()
     found = [
         signals
@@ -90,21 +90,15 @@ def columns_of(
     return {name.strip(): [("" if text else math.nan) if v is None else v for v in values]}
 
 
-def _dry_modes(results: Results, path: str, model: Model, id: int) -> list[Value]:
-    """Return stick or slip of a Force_DryFriction: in slip its force is `friction`, else it is not.
-
-    What sticks after friction_static holds more than that, what sticks else less.
-    """
+def _told(
+    results: Results, path: str, model: Model, kind: ForceKind, id: int, signal: str
+) -> list[Value]:
+    """Return what a kind of forces tells of the rows of an element."""
     if any(each.changes or each.inactive for each in model.simulations):
-        raise ModelError(
-            f"Force_DryFriction[{id}].mode: not known where <Command> changes elements"
-        )
-    values = model.table(_KIND)[id].values
-    turns = str(values["type"]).startswith("R")
-    force = results[f"{path}torque" if turns else f"{path}force"]
-    size = np.linalg.norm(np.atleast_2d(np.asarray(force, dtype=np.float64)), axis=1)
-    slips = np.abs(size - values["friction"]) <= ROUNDED * values["friction"]
-    return ["slip" if each else "stick" for each in slips]
+        name = f"{kind.statement}[{id}].{signal}"
+        raise ModelError(f"{name}: not known where <Command> changes elements")
+    wrench = (np.asarray(results[f"{path}{each}"]).reshape(-1, 3) for each in ("force", "torque"))
+    return list(kind.told[signal](model.table(kind.name)[id].values, *wrench))
 
 
 def _stored(

@@ -55,6 +55,7 @@ PARTS_OF_SCENE = {
     Hook.WRENCH: "forces",
     Hook.ELEMENT: "forces",
     Hook.JOINTS: "joints",
+    Hook.HIGHER_PAIRS: "joints",
     Hook.STICKING: "joints",
     Hook.REACTION_FORCES: "joints",
     Hook.EVALUATE: "evaluation",

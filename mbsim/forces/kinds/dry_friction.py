@@ -25,6 +25,8 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+import numpy as np
+
 from mbsim.arrays.codes import (
     AXIS_FORCE_AT_I,
     AXIS_TORQUE,
@@ -36,6 +38,9 @@ from mbsim.core.arrays import V2, V3
 from mbsim.core.jitable import jitable
 from mbsim.forces.catalog import Acts, Finding, Parameter, Switched, Values, force
 from mbsim.forces.formula import Kept
+
+#: f of a row is that of slip but for so many parts of it: it was turned into the global frame.
+ROUNDED = 1e-12
 
 
 @jitable
@@ -176,6 +181,16 @@ def _commit(x: float, rate: float, par: Sequence[float], kept: Kept) -> V3:
     return slider, mode, 0.5 * (stored * stored - force * force) / k
 
 
+def _modes(values: Values, force: np.ndarray, torque: np.ndarray) -> list[str]:
+    """Return stick or slip of each row: in slip f is `friction`, else it is not.
+
+    What sticks after friction_static holds more than that, what sticks else less.
+    """
+    f = np.linalg.norm(torque if _acts(values).turns else force, axis=1)
+    slips = np.abs(f - values["friction"]) <= ROUNDED * values["friction"]
+    return ["slip" if each else "stick" for each in slips]
+
+
 force(
     "DRYFRICTION",
     "Force_DryFriction",
@@ -203,6 +218,7 @@ force(
     title="dry friction",
     about="a dry slider between two markers that holds and slips",
     check=_check,
+    told={"mode": _modes},
     refused={
         "scale": "is Muscade's x'scale, by which it tells stick from slip; here the mode is "
         "kept, and there is nothing to scale"
