@@ -59,6 +59,7 @@ def facts(found: Identified) -> dict[str, Any]:
                 "high": unknown.high,
                 "step": judged.steps[k],
                 "discrepancy": judged.discrepancy[k],
+                "jacobian": judged.sources[k],
             }
             for k, (p, unknown) in enumerate(zip(judged.parameters, problem.unknowns, strict=True))
         },
@@ -163,7 +164,7 @@ def page(found: Identified) -> str:
             ("Records", "".join(_record(record) for record in judged.records)),
             ("Misfit", _misfit(judged)),
             ("Identifiability", _identifiability(found, judged)),
-            ("Differences", _differences(judged)),
+            ("Jacobian", _jacobian(judged)),
         ]
     sections += [
         ("Starts", _starts(found)),
@@ -305,15 +306,16 @@ def _identifiability(found: Identified, judged: Judged) -> str:
     return table(head, rows) + f'<p class="note">{escape(note)}</p>'
 
 
-def _differences(judged: Judged) -> str:
-    """Return the check of the differences."""
+def _jacobian(judged: Judged) -> str:
+    """Return what the columns are from, and their check."""
     from mbsim.view.report_parts import table
 
     rows = [
-        [p.name, step, f"{off:.2g}"]
-        for p, step, off in zip(judged.parameters, judged.steps, judged.discrepancy, strict=True)
+        [p.name, judged.steps[k], f"{judged.discrepancy[k]:.2g}", judged.sources[k]]
+        for k, p in enumerate(judged.parameters)
     ]
-    return table(("parameter", "step, part of the range", "two steps differ by"), rows)
+    head = ("parameter", "step, part of the range", "two steps differ by", "column from")
+    return table(head, rows)
 
 
 def _starts(found: Identified) -> str:

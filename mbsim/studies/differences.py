@@ -45,11 +45,14 @@ class Checked:
         As parts of the range.
     discrepancy : array, (unknowns,)
         By how much two steps differ, as a part of the column; 0 of a column that is 0.
+    sources : tuple of str
+        What each column is from, and why; see `mbsim.studies.columns`.
     """
 
     columns: Numbers
     steps: Numbers
     discrepancy: Numbers
+    sources: tuple[str, ...] = ()
 
 
 class _Stencil(NamedTuple):

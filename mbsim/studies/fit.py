@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mbsim.studies.differences import NoDifference, checked_jacobian, jacobian
+from mbsim.studies.columns import Columns
+from mbsim.studies.differences import NoDifference
 from mbsim.studies.distributions import Numbers
-from mbsim.studies.rounds import Ask, Stopped
+from mbsim.studies.rounds import Asking, Stopped
 
 if TYPE_CHECKING:
     from mbsim.studies.problem import Problem
@@ -39,6 +40,8 @@ class Fit:
         Of a failure, in words.
     stepped_back : int
         How many trial points it went back from because their runs failed.
+    columns : Columns, optional
+        What its slopes were from.
     """
 
     start: Numbers
@@ -49,7 +52,7 @@ class Fit:
     reason: str = ""
     iterations: int = 0
     stepped_back: int = 0
-    notes: list[str] = field(default_factory=list)
+    columns: Columns | None = None
 
 
 def residuals(problem: Problem, z: Numbers, curves: Numbers) -> Numbers:
@@ -72,7 +75,7 @@ def rows_of(problem: Problem, z: Numbers, columns: Numbers) -> Numbers:
     return np.concatenate([slopes, others])
 
 
-def fit_from(problem: Problem, start: Numbers, fit: Fit, ask: Ask) -> Fit:
+def fit_from(problem: Problem, start: Numbers, fit: Fit, ask: Asking) -> Fit:
     """Fit from a start, `fit` being kept up to date as it goes, and return it."""
     from scipy.optimize import least_squares
 
@@ -94,12 +97,11 @@ def fit_from(problem: Problem, start: Numbers, fit: Fit, ask: Ask) -> Fit:
         assert curves is not None
         fit.iterations += 1
         if fit.iterations == 1:
-            found = checked_jacobian(ask, z, curves, problem.sd if problem.is_stated else None)
-            steps[:] = found.steps
-            return rows_of(problem, z, found.columns)
-        return rows_of(problem, z, jacobian(ask, z, curves, steps))
+            sd = problem.sd if problem.is_stated else None
+            return rows_of(problem, z, columns.checked(ask, z, curves, sd).columns)
+        return rows_of(problem, z, columns.at(ask, z, curves))
 
-    steps = np.zeros(len(start))
+    fit.columns = columns = Columns(problem)
     # the method begins between the bounds
     inside = np.clip(start, 1e-6, 1.0 - 1e-6)
     try:

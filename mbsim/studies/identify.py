@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mbsim.errors import Interrupted, SolverError
-from mbsim.studies.differences import Checked, NoDifference, checked_jacobian
+from mbsim.studies.columns import Columns
+from mbsim.studies.differences import Checked, NoDifference
 from mbsim.studies.distributions import Numbers
 from mbsim.studies.fit import Fit, fit_from
 from mbsim.studies.judge import Judged, judge, linearity
 from mbsim.studies.local import Workers
-from mbsim.studies.rounds import Ask, Progress, Rounds, Stopped
+from mbsim.studies.rounds import Asking, Progress, Rounds, Stopped
 from mbsim.studies.sweep import processors
 from mbsim.studies.worker import Pool
 
@@ -107,7 +108,7 @@ def identify(problem: Problem, pool: Pool, progress: Progress | None = None) -> 
     fits = [Fit(start=start, z=start.copy()) for start in starts]
     with closing(pool):
         rounds = Rounds(problem, pool, progress)
-        works: list[Callable[[Ask], Fit]] = [
+        works: list[Callable[[Asking], Fit]] = [
             partial(fit_from, problem, fit.start, fit) for fit in fits
         ]
         _raise_ours(rounds.drive(works))
@@ -144,7 +145,8 @@ def _judged(
     sd = problem.sd if problem.is_stated else None
     if sd is not None and best.cost > 2.0 * len(curves):
         sd = None  # it is not the noise that decides
-    (checked,) = rounds.drive([lambda ask: checked_jacobian(ask, best.z, curves, sd)])
+    columns = best.columns or Columns(problem)
+    (checked,) = rounds.drive([lambda ask: columns.checked(ask, best.z, curves, sd)])
     if isinstance(checked, Stopped):
         return None, [], ["stopped before runs beside the best point: no covariance"]
     if isinstance(checked, NoDifference):
@@ -152,8 +154,12 @@ def _judged(
     if isinstance(checked, Exception):
         raise checked
     judged = judge(problem, best, checked)
-    added, notes = _linear(problem, best, judged, rounds)
-    return judged, added, [*_about_steps(problem, checked, judged), *notes]
+    notes = [
+        f"{name}: {said.replace('them', 'differences')}, which are taken"
+        for name, said in columns.disagree.items()
+    ]
+    added, bent = _linear(problem, best, judged, rounds)
+    return judged, added, [*notes, *_about_steps(problem, checked, judged), *bent]
 
 
 def _linear(

@@ -127,6 +127,7 @@ class Judged:
     misfit: Misfit
     steps: Numbers
     discrepancy: Numbers
+    sources: tuple[str, ...]
     axes: Numbers  # (directions, unknowns): of the unit cube, a standard deviation long
     warnings: list[str]
 
@@ -179,6 +180,7 @@ def judge(problem: Problem, fit: Fit, checked: Checked) -> Judged:
         misfit=misfit,
         steps=checked.steps,
         discrepancy=checked.discrepancy,
+        sources=checked.sources,
         axes=np.array([[d.sd * d.components[n] for n in names] for d in directions if d.seen]),
         warnings=[],
     )

@@ -15,7 +15,7 @@ import numpy as np
 from mbsim.errors import ModelError
 from mbsim.studies.distributions import Numbers, Spread
 from mbsim.studies.outputs import Output
-from mbsim.studies.records import Asked, Record, read_asked, read_columns, read_record
+from mbsim.studies.records import TIME, Asked, Record, read_asked, read_columns, read_record
 from mbsim.studies.study import Case, Study, load_toml, read_options, read_paths
 
 if TYPE_CHECKING:
@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from mbsim.run.settings import Settings
 
 _TABLES = ("study", "run", "parameters", "set", "records")
-_STUDY = ("model", "starts", "seed", "most_iterations")
+_STUDY = ("model", "starts", "seed", "most_iterations", "jacobian")
+#: Where slopes come from.
+JACOBIANS = ("auto", "sensitivities", "differences")
 _PARAMETER = ("path", "start", "low", "high", "scale", "prior")
 #: Of runs where the study does not say it: differences need runs that are the same but for what
 #: the parameters change.
@@ -31,8 +33,6 @@ TIGHT = 1e-8
 MOST_STARTS = 10_000
 #: A curve may be off by so much of the noise between rows, or of a hundredth of its range.
 _COARSE = 0.2
-#: The column of times, beside those of the records: no record can be called so.
-TIME = "run time"
 
 
 @dataclass(frozen=True)
@@ -105,6 +105,7 @@ class Problem:
     starts: int
     most_iterations: int
     notes: tuple[str, ...] = ()
+    jacobian: str = "auto"
 
     @property
     def name(self) -> str:
@@ -142,9 +143,9 @@ class Problem:
         """Return the parameters at a point of the unit cube."""
         return {u.name: u.value(float(each)) for u, each in zip(self.unknowns, z, strict=True)}
 
-    def case(self, run: int, z: Numbers) -> Case:
+    def case(self, run: int, z: Numbers, sensitivity: tuple[str, ...] = ()) -> Case:
         """Return the run at a point of the unit cube."""
-        return Case(run, self.values(z))
+        return Case(run, self.values(z), sensitivity)
 
     def curves(self, outputs: Mapping[str, Any], z: Numbers) -> Numbers | None:
         """Return what a run gives at all measured times, (rows,); None where it does not."""
@@ -208,6 +209,8 @@ def read_problem(file: str | Path) -> Problem:
         if not isinstance(table, dict):
             raise ModelError(f"{path}: {name}: must be a table")
     about = _about(tables["study"], faults)
+    if (way := tables["study"].get("jacobian", "auto")) not in JACOBIANS:
+        faults.append(f"study.jacobian = {way!r}: must be one of {', '.join(JACOBIANS)}")
     options = {"tol": TIGHT, **read_options(tables["run"], path, faults)}
     unknowns = _unknowns(tables["parameters"], faults)
     asked = read_asked(tables["records"], path.parent, tables["parameters"], faults)
@@ -234,7 +237,9 @@ def read_problem(file: str | Path) -> Problem:
             *(Output(one.name, signal=one.signal, reduce="curve") for one in asked),
         ),
     )
-    problem = Problem(study, tuple(unknowns), (), about["starts"], about["most_iterations"])
+    problem = Problem(
+        study, tuple(unknowns), (), about["starts"], about["most_iterations"], jacobian=way
+    )
     stand_ins = {u.name: u.start for u in unknowns}
     for name, table in tables["parameters"].items():
         high = table.get("high") if isinstance(table, dict) else None

@@ -29,6 +29,8 @@ _KEYS: dict[str, tuple[type, ...]] = {
     "to": (int, float),
 }
 _NEEDED = ("file", "signal", "column")
+#: The column of times, beside those of the records: no record can be called so.
+TIME = "run time"
 #: Between cells of a CSV: the one that the line of names has most of.
 _DELIMITERS = ",;\t"
 #: Rows of a record: fewer say nothing, more are a mistake.
@@ -75,6 +77,8 @@ class Record:
         values : mapping
             Of the parameters.
         """
+        if len(t) == 0:
+            return None
         wanted = self.time + self.shift(values)
         room = 1e-9 * max(abs(float(t[-1])), float(t[-1] - t[0]))
         if wanted[0] < t[0] - room or wanted[-1] > t[-1] + room:

@@ -43,10 +43,11 @@ TAKEN = ("run", "key", "status", "reason", "steps", "evaluations")
 
 
 class Case(NamedTuple):
-    """One run of a study: its number, and the values of its parameters."""
+    """One run of a study: its number, the values of its parameters, and what it is derived by."""
 
     run: int
     values: dict[str, float]
+    sensitivity: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -116,6 +117,16 @@ class Study:
             except (ArithmeticError, ValueError) as error:
                 raise ModelError(f"set.{path}: {self.paths[path]}: {error}") from None
         return found
+
+    def set_by(self, name: str) -> tuple[str, ...] | None:
+        """Return the attributes that a parameter is the value of; None where a formula has it."""
+        found = []
+        for path, parts in self._texts.items():
+            if any(isinstance(part, Formula) and name in part.names for part in parts):
+                if self.paths[path] != f"{{{name}}}":
+                    return None
+                found.append(path)
+        return tuple(found)
 
     def key(self, run: int, model: str) -> str:
         """Return the key of a run: a digest of all that its row follows from.

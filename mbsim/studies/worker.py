@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
-from mbsim.errors import Interrupted, MbsimError
+from mbsim.errors import Interrupted, MbsimError, UnknownSignal
 from mbsim.studies.outputs import Absent
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ class Row(NamedTuple):
     steps: int
     evaluations: int
     lost: bool = False  # whether its worker was, which says nothing of the run
+    slopes: dict[str, Any] | None = None  # of curves, see `_slopes`
 
 
 def failed(run: int, reason: str, lost: bool = False) -> Row:
@@ -65,7 +66,12 @@ def run_one(study: Study, case: Case, folder: Path | None = None) -> Row:
         model = read_model(study.model, study.overrides(case.values))
         kept = () if folder is not None else study.signals
         options = Options(
-            **study.options, output=folder, signals=kept, notify=said.append, bare=folder is None
+            **study.options,
+            output=folder,
+            signals=kept,
+            notify=said.append,
+            bare=folder is None,
+            sensitivity=case.sensitivity,
         )
         results = run_model(model, options)
     except Interrupted:
@@ -74,7 +80,28 @@ def run_one(study: Study, case: Case, folder: Path | None = None) -> Row:
         return failed(case.run, f"{type(error).__name__}: {error}")
     with results:
         warnings = [line for line in said if _warns(line)]
-        return _row(study, case, results, [*model.warnings, *warnings])
+        row = _row(study, case, results, [*model.warnings, *warnings])
+        if case.sensitivity and row.status != FAILED:
+            row = row._replace(slopes=_slopes(study, case, results))
+        return row
+
+
+def _slopes(study: Study, case: Case, results: Results) -> dict[str, Any]:
+    """Return derivatives of curves: attribute -> what is known of it, and lists by output."""
+    found: dict[str, Any] = {}
+    for path in case.sensitivity:
+        about, curves = results.parameters[path], {}
+        why = str(about["why"])
+        for output in study.outputs:
+            if output.is_curve and output.signal not in (None, "time"):
+                try:
+                    slope = results.sensitivity(str(output.signal), path)
+                except UnknownSignal as error:
+                    why = str(error)
+                else:
+                    curves[output.name] = np.asarray(slope, dtype=np.float64).tolist()
+        found[path] = {"evaluations": int(about["evaluations"]), "why": why, "curves": curves}
+    return found
 
 
 def _warns(line: str) -> bool:

@@ -38,7 +38,7 @@ class Kept:
         """Yield the row of each run in turn."""
         here = Here(self.study)
         for case in cases:
-            key = repr((self.study.overrides(case.values), self.study.options))
+            key = repr((self.study.overrides(case.values), self.study.options, case.sensitivity))
             if key not in self.rows:
                 self.runs += 1
                 (self.rows[key],) = here.share([case], 1)

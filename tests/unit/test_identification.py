@@ -412,7 +412,7 @@ def test_the_page_needs_no_other_file_and_escapes_what_it_quotes():
     assert "http" not in text.replace("http-equiv", "")
     assert "&lt;b&gt;" in text
     assert "<b>" not in text
-    for heading in ("Parameters", "Identifiability", "Misfit", "Differences", "Warnings"):
+    for heading in ("Parameters", "Identifiability", "Misfit", "Jacobian", "Warnings"):
         assert f"<h2>{heading}</h2>" in text
     assert text.count("<svg") == 2
     assert 'class="band' in text
