@@ -40,6 +40,8 @@ class Options:
     # from, None for the model's file
     sensitivity: tuple[str, ...] = ()
     source: Any = None
+    # how many times the run's evaluations each of them may take, 0 for no bound
+    sensitivity_worth: int = 0
     # of a rerun that verifies: what tolerances are multiplied by, and what bounds steps and work
     tighter: float = 1.0
     least_steps: float = 0.0

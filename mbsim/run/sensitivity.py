@@ -84,8 +84,8 @@ def directions(system: System, options: Options) -> list[Direction]:
     return found
 
 
-def attach(runner: Runner, found: Sequence[Direction]) -> None:
-    """Let a run that has been started carry derivatives along."""
+def attach(runner: Runner, found: Sequence[Direction], worth: int) -> None:
+    """Let a run that has been started carry derivatives along; `worth` as of `Sensitivities`."""
     from mbsim.arrays.hooks import Joints
     from mbsim.run.hook_calls import HookCalls
     from mbsim.sensitivity.setup import Sensitivities
@@ -101,7 +101,8 @@ def attach(runner: Runner, found: Sequence[Direction]) -> None:
                 hooks.ask_joints(Joints.PROJECT, start, y, y)
 
     tol = runner.settings.stages[0].tol
-    made = Sensitivities(runner.system, found, runner.method.y, assemble, runner.problem, tol)
+    y, problem = runner.method.y, runner.problem
+    made = Sensitivities(runner.system, found, y, assemble, problem, tol, worth)
     runner.methods.follow(made)
     runner.sensitivities = made
     runner.problem = runner.methods.problem

@@ -243,7 +243,7 @@ def _run(model: Model, options: Options) -> Results:
                 if found:
                     from mbsim.run.sensitivity import attach
 
-                    attach(runner, found)
+                    attach(runner, found, options.sensitivity_worth)
                 if options.dump_fclib is not None:
                     runner.dump_every(options.dump_fclib, options.resume)
                 runner.most_evaluations = options.most_evaluations

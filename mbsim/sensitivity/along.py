@@ -57,9 +57,11 @@ from mbsim.integrators.scheme import Method, in_workspace
 from mbsim.laws.catalog import UNDECIDED
 from mbsim.sensitivity.arrays import (
     ALIKE,
+    ASKED,
     BEFORE,
     CHANGES,
     F_BEFORE,
+    MOST,
     MOST_CHANGES,
     ODD,
     STRAIGHT,
@@ -211,6 +213,12 @@ def try_part(
 
 
 @jitable
+def is_too_much(V: Variations) -> bool:
+    """Return whether derivatives have taken all the evaluations that they are worth."""
+    return V.words[MOST] > 0 and V.words[ASKED] > V.words[MOST]
+
+
+@jitable
 def integrate(
     V: Variations, scene: Scene, t: float, h: float, k: int, begin: float, end: float, e: float
 ) -> int:
@@ -223,6 +231,8 @@ def integrate(
     tries, before = 0, begin
     while s < end:
         tries += 1
+        if is_too_much(V):
+            return Code.NOT_CONVERGED
         if tries % MANY_PARTS == 0:
             if s - before < PROGRESS * (end - begin):
                 # what is left is rounding of forces

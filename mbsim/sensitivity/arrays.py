@@ -28,7 +28,10 @@ STRAIGHT, ODD = 19, 20
 # whether derivatives are integrated along every step of the method, which has no step of its own
 # for them
 ALONG = 21
-WORDS = 22
+# how many times the run's own evaluations derivatives may take each, 0: as many as they do; how
+# many that is by the end of the step that is taken
+WORTH, MOST = 22, 23
+WORDS = 24
 #: Rows of `Variations.jump`: y before the commit, f before and behind it.
 BEFORE, F_BEFORE, F_BEHIND = range(3)
 #: Contacts that may begin or end within one step.
@@ -79,4 +82,4 @@ class Variations(NamedTuple):
 
 
 #: Why a derivative is not known from some time on.
-LOST_FAILED, LOST_JUMP, LOST_GRAZING, LOST_LARGE = range(1, 5)
+LOST_FAILED, LOST_JUMP, LOST_GRAZING, LOST_LARGE, LOST_WORK = range(1, 6)

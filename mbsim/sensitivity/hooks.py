@@ -19,6 +19,7 @@ from mbsim.core.problem import Problem, Taken
 from mbsim.integrators.galpha_iteration import DOT, LAST
 from mbsim.integrators.positions import is_rate
 from mbsim.integrators.scheme import (
+    EVALUATIONS,
     LAST_STEP,
     LAST_TIME,
     OWN_TIME,
@@ -30,6 +31,7 @@ from mbsim.integrators.scheme import (
 )
 from mbsim.sensitivity.along import (
     is_bent,
+    is_too_much,
     list_changes,
     order_changes,
     project_end,
@@ -49,7 +51,9 @@ from mbsim.sensitivity.arrays import (
     JOINTS,
     LOST_FAILED,
     LOST_LARGE,
+    LOST_WORK,
     METHOD,
+    MOST,
     ODD,
     ORDERED,
     OUTPUT,
@@ -59,6 +63,7 @@ from mbsim.sensitivity.arrays import (
     STRAIGHT,
     TWIN,
     UP,
+    WORTH,
     Variations,
 )
 from mbsim.sensitivity.events import (
@@ -78,6 +83,8 @@ AT = Hook.STEPPING
 #: A parameter that moves bodies by their usual sizes when it changes by 1e-9 of itself moves them
 #: by chance.
 LARGEST = 1e9
+#: What derivatives may take is counted from so many evaluations of the run on.
+AT_FIRST = 200
 
 
 @jitable
@@ -158,6 +165,7 @@ def take_step(V: Variations, scene: Scene, m: Method, t: float, h: float) -> Non
     """Carry all derivatives over the step from t that is taken."""
     twin = view(V.words[TWIN], Scene)
     V.words[CHANGES] = V.words[ORDERED] = 0
+    V.words[MOST] = V.words[WORTH] * len(V.size) * (m.counts[EVALUATIONS] + AT_FIRST)
     listed = len(scene.contacts.id) == 0 or list_changes(V, scene, t, h)
     V.words[FITTED] = 1 if m.memory[SHOWN] == 1.0 or V.words[ATTEMPT] == 0 else 0
     for k in range(len(V.size)):
@@ -165,7 +173,7 @@ def take_step(V: Variations, scene: Scene, m: Method, t: float, h: float) -> Non
             continue
         V.words[ODD] = 0
         if not listed or carry(V, scene, m, t, h, k) != 0:
-            lose(V, k, t, LOST_FAILED)
+            lose(V, k, t, LOST_WORK if is_too_much(V) else LOST_FAILED)
         elif V.words[REMEMBERED] > 0 and V.words[ODD] == 1:
             note_kept(V, scene, t + h, V.line[0], k)
         set_parameter(V, twin, scene, k, 0.0)

@@ -43,6 +43,7 @@ _WHY = {
     at.LOST_JUMP: "forces jump, or what friction keeps; how the time of that moves is unknown",
     at.LOST_GRAZING: "an event is met with next to no speed: its time has no derivative",
     at.LOST_LARGE: "it has grown beyond all bounds: the motion is chaotic",
+    at.LOST_WORK: "it takes far more evaluations than the run itself",
 }
 
 
@@ -76,6 +77,8 @@ class Sensitivities:
         Puts the bodies of a point of a system where constraints hold: the twin's, then the point.
     tol : float
         Of the run.
+    worth : int
+        A derivative ends where it has taken so many times the run's own evaluations, 0: nowhere.
     """
 
     def __init__(
@@ -86,6 +89,7 @@ class Sensitivities:
         assemble: Callable[[System, System, Any, Array], None],
         problem: Problem,
         tol: float,
+        worth: int = 0,
     ) -> None:
         self.system, self.directions = system, list(directions)
         self.twin = twin_of(system, directions)
@@ -95,6 +99,7 @@ class Sensitivities:
         own = problem._replace(context=int(self._table.ctypes.data))
         starts = [self._start(direction, assemble, own) for direction in self.directions]
         self.arrays = self._arrays(y, np.array(starts), tol)
+        self.arrays.words[at.WORTH] = worth
         self._pack()
         self._alive: Any = None
         self._mark: Any = None

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 
 _TABLES = ("study", "run", "parameters", "set", "records")
 _STUDY = ("model", "starts", "seed", "most_iterations", "jacobian")
+#: With jacobian = "auto" the derivatives of a run end where they have taken so many times its
+#: evaluations: twice what differences take, so that a costly stretch does not decide.
+WORTH = 4
 #: Where slopes come from.
 JACOBIANS = ("auto", "sensitivities", "differences")
 _PARAMETER = ("path", "start", "low", "high", "scale", "prior")
@@ -145,7 +148,7 @@ class Problem:
 
     def case(self, run: int, z: Numbers, sensitivity: tuple[str, ...] = ()) -> Case:
         """Return the run at a point of the unit cube."""
-        return Case(run, self.values(z), sensitivity)
+        return Case(run, self.values(z), sensitivity, WORTH if self.jacobian == "auto" else 0)
 
     def curves(self, outputs: Mapping[str, Any], z: Numbers) -> Numbers | None:
         """Return what a run gives at all measured times, (rows,); None where it does not."""

@@ -43,11 +43,15 @@ TAKEN = ("run", "key", "status", "reason", "steps", "evaluations")
 
 
 class Case(NamedTuple):
-    """One run of a study: its number, the values of its parameters, and what it is derived by."""
+    """One run of a study: its number, the values of its parameters, and what it is derived by.
+
+    Each derivative may take `worth` times the run's evaluations, 0 for as many as it does.
+    """
 
     run: int
     values: dict[str, float]
     sensitivity: tuple[str, ...] = ()
+    worth: int = 0
 
 
 @dataclass(frozen=True)

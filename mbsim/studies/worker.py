@@ -72,6 +72,7 @@ def run_one(study: Study, case: Case, folder: Path | None = None) -> Row:
             notify=said.append,
             bare=folder is None,
             sensitivity=case.sensitivity,
+            sensitivity_worth=case.worth,
         )
         results = run_model(model, options)
     except Interrupted:

@@ -11,9 +11,10 @@ from helpers.measured import BELT, curve, noisy, text_of, write_record
 from mbsim.errors import ModelError
 from mbsim.studies.columns import Columns
 from mbsim.studies.identify import identify
-from mbsim.studies.problem import read_problem
+from mbsim.studies.problem import WORTH, read_problem
 from mbsim.studies.rounds import Rounds
-from mbsim.studies.worker import Here
+from mbsim.studies.study import Case
+from mbsim.studies.worker import Here, run_one
 
 MASS, STIFFNESS, SPEED = 2.0, 8.0, 0.3
 DECK = f"""<Deck><Model>
@@ -172,7 +173,12 @@ def test_auto_takes_differences_where_sensitivities_are_more_work(tmp_path):
     problem = read_problem(tmp_path / "belt.toml")
     columns, checked, after = at_start(problem)
     assert columns.paths == {}
-    assert "times their evaluations" in checked.sources[0]
+    assert "it takes far more evaluations than the run itself" in checked.sources[0]
+    # that was found out for little
+    derived = problem.study.set_by("mu_static")
+    row = run_one(problem.study, Case(0, {"mu_static": 0.99}, derived, WORTH))
+    took = row.slopes[derived[0]]["evaluations"]
+    assert row.evaluations < took < (WORTH + 1) * (row.evaluations + 200)
     assert np.abs(after - checked.columns).max() <= 1e-12 * np.abs(after).max()
 
 
