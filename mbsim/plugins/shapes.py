@@ -40,7 +40,7 @@ def load_surface(
             return numbers(result, 3, " [x, y, z]")
         except NotAForce as error:
             message = f"{title}: {user.fnc_name} at u {u:g}, v {v:g} {error} ({script.path})"
-        except Exception as error:
+        except Exception as error:  # users' code may raise anything
             kind = type(error).__name__
             message = f"{title}: {user.fnc_name} failed at u {u:g}, v {v:g}: {kind}: {error}"
             raise PluginError(f"{message} ({script.path})") from error

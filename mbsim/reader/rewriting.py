@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -27,7 +28,7 @@ def _fields(kind: type) -> tuple[str, ...]:
     return tuple(each.name for each in dataclasses.fields(kind) if each.init)
 
 
-class Rewriting:
+class Rewriting(ABC):
     """Replaces functions in all expressions that a draft holds; `call` says which, and by what."""
 
     def __init__(self, draft: Draft) -> None:
@@ -35,9 +36,9 @@ class Rewriting:
         self.faults: list[Fault] = []
         self.source = Source()
 
+    @abstractmethod
     def call(self, node: Call) -> Node | None:
         """Return what a function means, None to leave it as it is."""
-        raise NotImplementedError
 
     def fault(self, statement: str, id: int, said: str) -> None:
         """Add a fault of an element, where the expression stands that shows it."""
