@@ -96,14 +96,19 @@ def _seen_from(markers: MarkerTable, row: int, place: Array) -> Array:
     return found
 
 
+def _near(markers: MarkerTable, point: PointOnCurve | PointOnSurface) -> Array:
+    """Return the place next to which a point touches at the start, global: its own unless given."""
+    if point.start is not None:
+        return _global(markers, point.start_marker_id, point.start)
+    return markers.frame(markers.row(point.i_marker_id))[0]
+
+
 def _add_point_on_curve(
     model: Model, markers: MarkerTable, table: CurveTable, point: PointOnCurve, equation: int
 ) -> int:
     """Return the row of a curve that holds a point."""
     i, j = markers.row(point.i_marker_id), markers.row(point.j_marker_id)
-    near, _ = markers.frame(i)
-    if point.start is not None:
-        near = _global(markers, point.start_marker_id, point.start)
+    near = _near(markers, point)
     curve = model.curves[point.curve_id]
     pieces = pieces_of(curve)
     row = table.add(curve, pieces, (i, j), equation)
@@ -151,9 +156,7 @@ def _add_point_on_surface(
 ) -> None:
     """Add a surface that holds a point; where no functions are known it is one that is not used."""
     i, j = markers.row(point.i_marker_id), markers.row(point.j_marker_id)
-    near, _ = markers.frame(i)
-    if point.start is not None:
-        near = _global(markers, point.start_marker_id, point.start)
+    near = _near(markers, point)
     surface = model.surfaces[point.surface_id]
     patches = UNKNOWN
     if functions is not None:
