@@ -46,7 +46,6 @@ def rerun(results: Results, every: float) -> Iterator[Results]:
     if named["integrator"] == RIGID:
         raise ModelError(f"{results.path}: integrator {RIGID} has no state between its steps")
     Replay(results)
-    time = np.atleast_1d(results["time"])
     with tempfile.TemporaryDirectory() as folder:
         try:
             simulate(
@@ -68,21 +67,22 @@ def rerun(results: Results, every: float) -> Iterator[Results]:
                 raise
         (file,) = Path(folder).glob("*.h5")
         with open_results(file) as again:
-            _compare(results, again, float(time[-1]))
+            _compare(results, again)
             yield again
 
 
-def _compare(results: Results, again: Results, end: float) -> None:
-    """Raise `ModelError` unless the run once more is at the last row where it was."""
-    times = np.atleast_1d(again["time"])
+def _compare(results: Results, again: Results) -> None:
+    """Raise `ModelError` unless the run once more is at the last row of both where it was.
+
+    That of a run which was interrupted need not be its last.
+    """
     if results.attributes["integrator"] == ASKS_WHERE_ROWS_ARE:
         return
-    same = np.flatnonzero(times == end)
-    if not len(same) or not np.array_equal(
-        np.atleast_2d(again["state/y"])[same[0]], np.atleast_2d(results["state/y"])[-1]
-    ):
+    times, here, there = np.intersect1d(results["time"], again["time"], return_indices=True)
+    was = np.atleast_2d(results["state/y"])[here[-1]]
+    if not np.array_equal(np.atleast_2d(again["state/y"])[there[-1]], was):
         raise ModelError(
-            f"{results.path}: run again it is not at time {end:g} where it was, so that nothing "
+            f"{results.path}: run again it is not at time {times[-1]:g} where it was, so nothing "
             "is known between its rows: a user's code asks for the time of day or chance, or the "
             'deck has compatibility="MOTIONSOLVE", where steps are no longer than rows are apart; '
             "ask without --every"

@@ -398,6 +398,22 @@ def test_between_rows_nothing_is_known_of_a_run_that_ends_elsewhere_again(tmp_pa
                 pass
 
 
+def test_between_rows_of_a_run_that_was_interrupted(tmp_path):
+    """Its last row need be none of those that are asked for."""
+    run(tmp_path, FRICTIONS["none"]).close()
+    file = tmp_path / "out" / "deck.h5"
+    with mbsim.open_results(file) as results:
+        rows = len(results["time"])
+    with h5py.File(file, "r+") as stored:
+        for name in ("time", "state/y"):
+            kept = stored[name][: rows - 3]
+            del stored[name]
+            stored[name] = kept
+    with mbsim.open_results(file) as results, rerun(results, 0.004) as more:
+        assert more["time"][-1] == pytest.approx(0.4)
+        assert 0.37 not in more["time"]
+
+
 def test_dry_friction_says_whether_it_sticks(tmp_path):
     """A slider on a spring of 1e4 N/m with F = 1 N slips for two half periods, then holds."""
     (tmp_path / "deck.xml").write_text(SLIDER)
