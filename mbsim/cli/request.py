@@ -60,7 +60,7 @@ def command(
     from mbsim.results.files import replace_text
     from mbsim.results.form import finite
     from mbsim.results.reading import open_results
-    from mbsim.run.between_rows import rerun
+    from mbsim.run.between_rows import ASKS_WHERE_ROWS_ARE, rerun
     from mbsim.run.replay import request
 
     if output is not None and as_json:
@@ -68,6 +68,9 @@ def command(
     with open_results(result) as results, no_scripts(not scripts):
         with nullcontext(results) if every is None else rerun(results, every) as rows:
             time, columns = request(rows, names)
+        if every is not None and results.attributes["integrator"] == ASKS_WHERE_ROWS_ARE:
+            said = f"steps of {ASKS_WHERE_ROWS_ARE} depend on rows: this is another run within tol"
+            echo(f"mbsim: {said}", err=True)
     if as_json:
         print_json({"result_file": str(result), "time": time.tolist(), "signals": finite(columns)})
         return

@@ -414,6 +414,16 @@ def test_between_rows_of_a_run_that_was_interrupted(tmp_path):
         assert 0.37 not in more["time"]
 
 
+def test_of_dop853_it_is_said_that_what_is_between_rows_is_another_run(tmp_path):
+    run(tmp_path, FRICTIONS["none"], integrator="DOP853").close()
+    file = str(tmp_path / "out" / "deck.h5")
+    said = CliRunner().invoke(
+        main, ["request", file, "Force_Contact[301].force", "--every", "0.005"]
+    )
+    assert said.exit_code == 0
+    assert "steps of DOP853 depend on rows: this is another run within tol" in said.stderr
+
+
 def test_dry_friction_says_whether_it_sticks(tmp_path):
     """A slider on a spring of 1e4 N/m with F = 1 N slips for two half periods, then holds."""
     (tmp_path / "deck.xml").write_text(SLIDER)
