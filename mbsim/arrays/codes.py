@@ -312,7 +312,7 @@ EVENT_TIME, EVENT_KIND, EVENT_ELEMENT, EVENT_SLOT = range(4)
 
 #: Rows of `Sweep.cone`: those of stiction.cones, and three of stiction.rigid_contact.
 CONE_ROWS = 12
-SLOT_COLUMNS = 32
+SLOT_COLUMNS = 33
 #: What `contact.memory.put_aside` keeps of a slot, and twice the memory: frames, mode, point,
 #: `Work.slot`.
 SPARE = 24 + SLOT_COLUMNS

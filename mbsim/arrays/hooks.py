@@ -166,6 +166,7 @@ class Sticking(IntEnum):
     RELEASE = 6  # let slip what is not held: how many do
     RECORD = 7  # append events
     CHANGED = 8  # whether other slots stick than in the last step: 1, else 0
+    LIMIT = 9  # write what each slot is taken to hold at least
 
 
 class Memory(IntEnum):

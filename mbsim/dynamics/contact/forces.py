@@ -104,6 +104,8 @@ NORMAL_SLOPE, LIMIT_SLOPE, FOUND_AT, NORMAL_THEN, LIMIT_THEN, FOUND_OVER = range
 STIFFNESS_SLOPE, STIFFNESS_THEN = 29, 30
 # the part of its normal force that rubs at its place on a rim (`contact.rims`)
 PRESSED_PART = 31
+# what rigid friction is taken to hold at least, where the audit asks for it
+HELD_AT_LEAST = 32
 
 # part by which k d/F has to be off 1 for a normal force's stiffness to change with its depth
 CHANGES = 1e-9

@@ -79,7 +79,7 @@ from mbsim.arrays.codes import (
     WORST_OPEN,
     WORST_TIME,
 )
-from mbsim.arrays.hooks import Contacts, Hook, Joints, answer_of, note_failure
+from mbsim.arrays.hooks import Contacts, Hook, Joints, Sticking, answer_of, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
@@ -92,8 +92,14 @@ from mbsim.dynamics.bodies.scales import fill_squares
 from mbsim.dynamics.constraints.equations import MISMATCH, RESIDUAL
 from mbsim.dynamics.constraints.folding import is_sticking
 from mbsim.dynamics.constraints.in_use import active_count, is_friction
-from mbsim.dynamics.contact.forces import FORCE, NORMAL, contact_of, pressing, sides
-from mbsim.dynamics.contact.memory import least_limit
+from mbsim.dynamics.contact.forces import (
+    FORCE,
+    HELD_AT_LEAST,
+    NORMAL,
+    contact_of,
+    pressing,
+    sides,
+)
 from mbsim.dynamics.pipeline.output import fill_energy
 from mbsim.geometry.catalog import AT_NORMAL
 
@@ -343,13 +349,11 @@ def examine_fold(scene: Scene, t: float) -> None:
 
 
 @jitable
-def examine_friction(scene: Scene, t: float) -> None:
+def examine_friction(scene: Scene, t: float, y: F1) -> None:
     """Look whether friction is within its cone at every incident."""
-    audit, work, hit, largest = scene.audit, scene.work, scene.work.hit, 0.0
-    for k in range(hit[len(hit) - 1]):
-        c = contact_of(scene, hit[k])
-        if scene.contacts.rigid[c] == 1:
-            largest = max(largest, audit.cone[c] * pressing(scene, hit[k]))
+    audit, work, hit = scene.audit, scene.work, scene.work.hit
+    if scene.world.hooks[Hook.STICKING] != 0:
+        call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.LIMIT, t, y))
     for k in range(hit[len(hit) - 1]):
         s = hit[k]
         c = contact_of(scene, s)
@@ -360,7 +364,7 @@ def examine_friction(scene: Scene, t: float) -> None:
         tangential = norm(sub(force, scale(normal, n)))
         most = audit.cone[c] * max(0.0, pressing(scene, s))
         if scene.contacts.rigid[c] == 1:
-            most = max(most, least_limit(scene, s, largest))
+            most = max(most, work.slot[s, HELD_AT_LEAST])
         row = audit.contact[c]
         row[LARGEST_FRICTION] = max(row[LARGEST_FRICTION], most)
         if tangential > most + CONE_ROUNDING * abs(normal):

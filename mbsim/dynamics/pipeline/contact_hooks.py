@@ -88,7 +88,7 @@ def serve_contacts(context: int, what: int, t: float, h: float, a: Pointer, b: P
     elif what == Contacts.TOUCHED:
         mark_touched(scene)
     else:
-        examine_friction(scene, t)
+        examine_friction(scene, t, y)
         examine_work(scene, t, y)
     return 0
 

@@ -39,6 +39,7 @@ from mbsim.dynamics.stiction.rigid_shares import (
     WHICH,
     capacity,
     fill_cones,
+    fill_least_limits,
     fill_slip,
     first_of_slots,
     most_capacity,
@@ -419,6 +420,8 @@ def serve_sticking(scene: Scene, what: int, t: float, y: F1) -> int:
         record_sticking(scene, t, y)
     elif what == Sticking.CHANGED:
         return changed_sticking(scene)
+    elif what == Sticking.LIMIT:
+        fill_least_limits(scene)
     elif what == Sticking.LOAD:
         share_sticking(scene, t, y)
         return in_millionths(sticking_part(scene))

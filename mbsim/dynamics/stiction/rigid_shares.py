@@ -13,7 +13,7 @@ from mbsim.dynamics.constraints.equations import add_wrench, along, fill_equatio
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.selection import sticks
 from mbsim.dynamics.constraints.tree import respond
-from mbsim.dynamics.contact.forces import FORCE, NORMAL, contact_of
+from mbsim.dynamics.contact.forces import FORCE, HELD_AT_LEAST, NORMAL, contact_of
 from mbsim.dynamics.contact.memory import least_limit
 from mbsim.dynamics.stiction.cones import CAPACITY, LOAD, SHARED, part_at_most, solve_cones
 from mbsim.dynamics.stiction.cones import FORCE as HELD_BY
@@ -84,6 +84,19 @@ def most_capacity(scene: Scene) -> float:
         if sticks(scene, e):
             most = max(most, capacity(scene, slot[e]))
     return most
+
+
+@jitable
+def fill_least_limits(scene: Scene) -> None:
+    """Write what every touching slot of rigid friction is taken to hold at least."""
+    hit, most = scene.work.hit, 0.0
+    for k in range(hit[len(hit) - 1]):
+        if scene.contacts.rigid[contact_of(scene, hit[k])] == 1:
+            most = max(most, capacity(scene, hit[k]))
+    for k in range(hit[len(hit) - 1]):
+        s = hit[k]
+        if scene.contacts.rigid[contact_of(scene, s)] == 1:
+            scene.work.slot[s, HELD_AT_LEAST] = least_limit(scene, s, most)
 
 
 @jitable
