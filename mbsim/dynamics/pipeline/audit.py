@@ -353,7 +353,7 @@ def examine_friction(scene: Scene, t: float, y: F1) -> None:
     """Look whether friction is within its cone at every incident."""
     audit, work, hit = scene.audit, scene.work, scene.work.hit
     if scene.world.hooks[Hook.STICKING] != 0:
-        call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.LIMIT, t, y))
+        answer_of(scene, call_int(scene.world.hooks[Hook.STICKING], (scene, Sticking.LIMIT, t, y)))
     for k in range(hit[len(hit) - 1]):
         s = hit[k]
         c = contact_of(scene, s)
