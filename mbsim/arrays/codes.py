@@ -107,6 +107,8 @@ ALONG_U, ALONG_V = range(2)
 
 # entries of `Sweep.pair`
 PAIR_VALUE, PAIR_RATE, PAIR_SECOND = range(3)
+#: Results of a user's relation of n terms: its value, then n slopes, then n by n second ones.
+RELATION_VALUE, RELATION_SLOPES = range(2)
 
 # entries of `Sweep.quality`: when equations were chosen last, the largest of those, and whether
 # the committed state is near a position in which a loop can fold; how far the last step left

@@ -37,25 +37,26 @@ class Hook(IntEnum):
     JOINTS = 13  # what joints are asked for: `Joints`
     STICKING = 14  # contacts whose friction holds without give: `Sticking`
     HIGHER_PAIRS = 15  # equations of points and curves that stay on curves and surfaces
-    REACTION_FORCES = 16  # forces by reactions: friction in joints, expressions of them
-    EVALUATE = 17  # the whole rhs
-    TANGENT = 18  # no hook: where the packed arrays of `compile_model.tangent` are
-    BEND = 19  # how forces of equations turn with the bodies
-    CONTACT_SLOPES = 20  # derivatives of contacts: `ContactSlopes`
-    FACE_SLOPES = 21  # of flat faces that are one incident: `FaceSlopes`
-    MEMORY = 22  # friction that carries numbers in y, in linear systems: `Memory`
-    SLOPES = 23  # derivatives of forces between markers
-    MEMORY_PAIR = 24  # as MEMORY in complex systems
-    GAUGES = 25  # what is measured of contacts: `Gauges`
-    EFFECTS = 26  # what an error does to contacts, as implicit methods ask: `Effects`
-    STABILITY = 27  # what contacts bound steps of fixed length by: `Stability`
-    PASSING = 28  # how long pairs of meshes that touch pass through no wall
-    FCL_POINTS = 29  # what follows from points that FCL found: `FclPoints`
-    DRY = 30  # what Force_DryFriction and Force_Element keep of a step: `Dry`
-    ANGLES = 31  # turns of followed angles, ways along curves
-    NEAR = 32  # the lists of near pairs
-    REQUESTS = 33  # expressions of requests
-    STEPPING = 34  # no hook: where the packed arrays of `stepping.arrays` are
+    RELATIONS = 16  # equations that are a user's relation of terms
+    REACTION_FORCES = 17  # forces by reactions: friction in joints, expressions of them
+    EVALUATE = 18  # the whole rhs
+    TANGENT = 19  # no hook: where the packed arrays of `compile_model.tangent` are
+    BEND = 20  # how forces of equations turn with the bodies
+    CONTACT_SLOPES = 21  # derivatives of contacts: `ContactSlopes`
+    FACE_SLOPES = 22  # of flat faces that are one incident: `FaceSlopes`
+    MEMORY = 23  # friction that carries numbers in y, in linear systems: `Memory`
+    SLOPES = 24  # derivatives of forces between markers
+    MEMORY_PAIR = 25  # as MEMORY in complex systems
+    GAUGES = 26  # what is measured of contacts: `Gauges`
+    EFFECTS = 27  # what an error does to contacts, as implicit methods ask: `Effects`
+    STABILITY = 28  # what contacts bound steps of fixed length by: `Stability`
+    PASSING = 29  # how long pairs of meshes that touch pass through no wall
+    FCL_POINTS = 30  # what follows from points that FCL found: `FclPoints`
+    DRY = 31  # what Force_DryFriction and Force_Element keep of a step: `Dry`
+    ANGLES = 32  # turns of followed angles, ways along curves
+    NEAR = 33  # the lists of near pairs
+    REQUESTS = 34  # expressions of requests
+    STEPPING = 35  # no hook: where the packed arrays of `stepping.arrays` are
 
 
 class Contacts(IntEnum):

@@ -311,6 +311,7 @@ class Equations(NamedTuple):
     program: I1  # (ne,) function of TIME, or the whole of a general constraint; -1 for none
     level: I1  # (ne,) 2 holds displacements, 1 velocities, 0 accelerations
     general: I1  # (ne,) 1 where the program is the whole equation
+    user: I1  # (ne,) 1 + row of `Users` whose relation of the terms it is, 0 for their sum
     constant: F1  # (ne,)
     start: F2  # (ne, 2) sum and its rate that assembly brings about where no level does; or NaN
     unit: F1  # (ne,) what a residual is measured by: L, or 1 for angles

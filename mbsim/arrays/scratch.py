@@ -93,7 +93,8 @@ class Sweep(NamedTuple):
     quality: tags.State[F1]  # (18,) least pivot over its size squared, see codes
     stress: F2  # (ne, 6 nj) self-stresses of implied equations
     jet: F1  # (12,) what a program gives
-    pair: F1  # (3,) value, rate and second rate of a term of a higher pair
+    pair: F1  # (3,) value, rate and second rate of a term of a higher pair, or of a relation
+    related: F2  # (terms, 3) the same of the terms that an equation of a user's relation has
     located: F1  # (curves + 2 surfaces,) parameters of where higher pairs touch
     share: F2  # (nh, nh) slips of what sticks, by rows: S of stiction.cones, and its matrix
     mix: F2  # (nh, nh)

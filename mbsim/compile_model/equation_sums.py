@@ -18,6 +18,7 @@ class Sums:
     program: list[int] = field(default_factory=list)
     level: list[int] = field(default_factory=list)
     general: list[int] = field(default_factory=list)
+    user: list[int] = field(default_factory=list)
     constant: list[float] = field(default_factory=list)
     start: list[tuple[float, float]] = field(default_factory=list)
     unit: list[float] = field(default_factory=list)
@@ -43,6 +44,7 @@ class Sums:
         self.program.append(program)
         self.level.append(level)
         self.general.append(general)
+        self.user.append(0)
         self.constant.append(constant)
         position, rate = (np.nan if value is None else value for value in start)
         self.start.append((position, rate))
@@ -64,6 +66,7 @@ class Sums:
             program=ints(self.program),
             level=ints(self.level),
             general=ints(self.general),
+            user=ints(self.user),
             constant=np.array(self.constant, dtype=np.float64),
             start=np.array(self.start, dtype=np.float64).reshape(-1, 2),
             unit=np.array(self.unit, dtype=np.float64),

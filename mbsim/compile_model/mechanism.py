@@ -243,15 +243,20 @@ class _Builder:
         )
 
     def add_coupler(self, coupler: Coupler) -> None:
-        """Add a coupler: a sum of displacements of joints stays what it is."""
+        """Add a coupler: a sum of displacements of joints stays what it is, or a relation is 0."""
         connection = self.connect("COUPLER", coupler.id, *self.joint_markers(coupler.joint_ids[0]))
-        total, rows = 0.0, []
+        total, rows, by_user = 0.0, [], coupler.user is not None
+        scales = (1.0,) * len(coupler.joint_ids) if by_user else coupler.scales
         for joint_id, kind, scale in zip(
-            coupler.joint_ids, coupler.motion_types, coupler.scales, strict=True
+            coupler.joint_ids, coupler.motion_types, scales, strict=True
         ):
             rows.append(_DIRECTIONS[kind])
             total += self.add_term(rows[-1], *self.joint_markers(joint_id), scale)
-        self.sums.close(connection, "its ratio", total, self.unit(rows))
+        if by_user:
+            self.sums.close(connection, "its relation", 0.0, self.unit(rows))
+            self.sums.user[-1] = 1 + self.programs.users["COUPLER", coupler.id]
+        else:
+            self.sums.close(connection, "its ratio", total, self.unit(rows))
 
     def add_general(self, constraint: GeneralConstraint) -> None:
         """Add an expression that is 0: one term for each body that it looks at."""
@@ -447,8 +452,8 @@ def constrain(
 
 def sweep(mechanism: Mechanism) -> Sweep:
     """Return scratch for the recursion and the equations."""
-    nt, ne = len(mechanism.tree.body), len(mechanism.equations.program)
-    nh = int((mechanism.equations.slot >= 0).sum())
+    eq = mechanism.equations
+    nt, ne, nh = len(mechanism.tree.body), len(eq.program), int((eq.slot >= 0).sum())
     return Sweep(
         H=np.zeros((nt, 6, 6)),
         S=np.zeros((nt, 6, 6)),
@@ -463,7 +468,7 @@ def sweep(mechanism: Mechanism) -> Sweep:
         answer=np.zeros((nt, 6)),
         mark=np.zeros(nt, dtype=np.int64),
         chosen=np.zeros(ne + 1, dtype=np.int64),
-        G=np.zeros((len(mechanism.equations.kind), 12)),
+        G=np.zeros((len(eq.kind), 12)),
         rate=np.zeros((ne, 4)),
         A=np.zeros((ne, ne)),
         multiplier=np.zeros(ne),
@@ -479,6 +484,7 @@ def sweep(mechanism: Mechanism) -> Sweep:
         stress=np.zeros((ne, 6 * len(mechanism.elements))),
         jet=np.zeros(12),
         pair=np.zeros(3),
+        related=np.zeros((int(np.diff(eq.first)[eq.user > 0].max(initial=0)), 3)),
         located=np.zeros(len(mechanism.along)),
         share=np.zeros((nh, nh)),
         mix=np.zeros((nh, nh)),

@@ -60,11 +60,11 @@ def load(
 ) -> dict[tuple[str, int], UserSubroutine]:
     """Return the subroutines by (kind, id) of their elements, in order of their rows."""
     found = {}
-    begin, end = _span(model)
+    span = _span(model)
     for each in wanted(model):
-        user = load_subroutine(each, plugins, scripts, model.file)
+        user = load_subroutine(each, plugins, scripts, model.file, span)
         if each.call is Call.MOTION:
-            check_rates(user, each, begin, end, model.file)
+            check_rates(user, each, *span, model.file)
         found[each.kind, each.id] = user
     return found
 

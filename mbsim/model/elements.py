@@ -30,7 +30,7 @@ from mbsim.model.forces import (
     VectorForce,
 )
 from mbsim.model.simulation import Change, Linear, Plant, Simulation, Static, Transient
-from mbsim.model.source import ASIDE, NO_RESULT, Source, Subroutine
+from mbsim.model.source import ASIDE, NO_RESULT, RelationSubroutine, Source, Subroutine
 
 __all__ = [
     "ASIDE",
@@ -55,6 +55,7 @@ __all__ = [
     "Model",
     "Motion",
     "Plant",
+    "RelationSubroutine",
     "Request",
     "ScalarForce",
     "Sensor",
@@ -243,6 +244,7 @@ class Coupler:
     """Constraint_Coupler: the sum over joints of scale times displacement is constant.
 
     `motion_types` says for each joint whether its rotation (R) or its translation (T) counts.
+    With a subroutine what it gives is 0 instead, and there are no scales.
     """
 
     id: int
@@ -250,6 +252,7 @@ class Coupler:
     joint_ids: tuple[int, ...] = ()
     motion_types: tuple[str, ...] = ()
     scales: tuple[float, ...] = ()
+    user: RelationSubroutine | None = None
     source: Source = Source()
 
 

@@ -39,3 +39,18 @@ class StateSubroutine(Subroutine):
     state_ids: tuple[int, ...] = ()  # Control_Diff, in their order
     input_ids: tuple[int, ...] = ()  # Reference_Variable
     outputs: int = 0
+
+
+@dataclass(frozen=True)
+class RelationSubroutine(Subroutine):
+    """A subroutine that gives a relation of displacements, and its derivatives (COUSUB)."""
+
+    count: int = 0  # of displacements
+    first: str = ""  # function of the first derivatives (COUXX)
+    second: str = ""  # of the second (COUXX2)
+    named: bool = False  # whether the deck names both: then they must be there
+
+    @property
+    def results(self) -> int:
+        """How many numbers it gives: the relation, its first and its second derivatives."""
+        return 1 + self.count + self.count * self.count

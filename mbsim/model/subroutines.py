@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from mbsim.forces.catalog import Components, Expressed, of_form
 from mbsim.model.elements import Model
-from mbsim.model.source import StateSubroutine, Subroutine
+from mbsim.model.source import RelationSubroutine, StateSubroutine, Subroutine
 
 
 class Call(Enum):
@@ -18,6 +18,7 @@ class Call(Enum):
     PLAIN = "id, time, par, npar, iflag"
     MOTION = "id, time, par, npar, iord, iflag"
     STATES = "id, time, par, npar, dflag, iflag, nstate, states, ninput, input, noutput"
+    RELATION = "id, time, par, npar, disp, ndisp, iflag"
 
 
 #: Numbers that a REQSUB returns.
@@ -33,7 +34,7 @@ class Wanted(NamedTuple):
     ----------
     kind : str
         Of `forces.catalog`, or VARIABLE, DIFF, GSE, SENSOR, SENVAL (what a sensor evaluates),
-        MOTION, REQUEST: with the id what `expressions.tree.UserResult` names.
+        MOTION, COUPLER, REQUEST: with the id what `expressions.tree.UserResult` names.
     statement : str
         The XML's name of the statement.
     id : int
@@ -59,6 +60,8 @@ def asking(each: Wanted) -> tuple[Any, ...]:
     if isinstance(each.user, StateSubroutine):
         n, m = len(each.user.state_ids), len(each.user.input_ids)
         return (0, 1, n, [0.0] * n, m, [0.0] * m, each.user.outputs)
+    if isinstance(each.user, RelationSubroutine):
+        return ([0.0] * each.results, 1)
     return {Call.FORCE: (0, 1), Call.PLAIN: (1,), Call.MOTION: (*each.orders[:1], 1)}[each.call]
 
 
@@ -66,7 +69,7 @@ def calls(each: Wanted) -> tuple[tuple[int, ...], ...]:
     """Return what stands behind id, time, par, npar in the calls for numbers."""
     if each.call is Call.MOTION:
         return tuple((iord, 0) for iord in each.orders)
-    return ((0,),) if each.call is Call.PLAIN else ((0, 0),)
+    return ((0,),) if each.call in (Call.PLAIN, Call.RELATION) else ((0, 0),)
 
 
 def wanted(model: Model) -> list[Wanted]:
@@ -90,6 +93,9 @@ def _wanted(model: Model) -> Iterator[Wanted]:
     for motion in _with_users(model.motions):
         orders = ORDERS[motion.val_type]
         yield Wanted("MOTION", motion.statement, motion.id, motion.user, 3, Call.MOTION, orders)
+    for coupler in _with_users(model.couplers):
+        user = coupler.user
+        yield Wanted("COUPLER", "Constraint_Coupler", coupler.id, user, user.results, Call.RELATION)
     for name, statement, table, results in (
         ("SENSOR", "Sensor_Event", model.sensors, 1),
         ("SENVAL", "Sensor_Evaluate", model.evaluations, 1),

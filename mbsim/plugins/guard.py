@@ -224,7 +224,8 @@ def state_callback(
         Name of the function, and its file.
     each : Wanted
         How it is called, and how many numbers it gives. A motion's gives one a call, and is not
-        given a state to look at: it is of the time alone.
+        given a state to look at: it is of the time alone. A relation's finds displacements in the
+        results, and looks at nothing else.
 
     Returns
     -------
@@ -238,23 +239,25 @@ def state_callback(
     from mbsim.model.subroutines import Call, asking, calls
 
     count, id = each.results, each.id
-    results_at = Views(count)
+    results_at, related = Views(count), each.call is Call.RELATION
     name, source = place
     function = watched(function, f"{title}: {name} ({source})")
     values, npar = [float(value) for value in each.user.par], len(each.user.par)
     first, (flags, *others) = asking(each), calls(each)
     moves, at_rows = each.call is Call.MOTION, each.kind == "REQUEST"
+    blind = moves or related
     started = False
 
     def guarded(scene: int, time: float, y: int, results: int) -> int:
         nonlocal started
         outer, outer_row, host.time = host.state, host.at_row, time
-        host.state, host.at_row = None if moves else (scene, time, y), at_rows
+        host.state, host.at_row = None if blind else (scene, time, y), at_rows
         try:
             if not started:
                 started = True
                 function(id, time, values.copy(), npar, *first)
-            result = function(id, time, values.copy(), npar, *flags)
+            found = (results_at[results].tolist(),) if related else ()
+            result = function(id, time, values.copy(), npar, *found, *flags)
             if moves:
                 room = results_at[results]
                 room[0] = one_number(result)[0]

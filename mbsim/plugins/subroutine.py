@@ -16,15 +16,16 @@ import numpy.typing as npt
 
 from mbsim.errors import PluginError
 from mbsim.model.names import element_name, is_adams
-from mbsim.model.source import StateSubroutine
+from mbsim.model.source import RelationSubroutine, StateSubroutine
 from mbsim.model.subroutines import Call, Wanted
 from mbsim.plugins import guard
 from mbsim.plugins.helpers import host
+from mbsim.plugins.relation import related
 from mbsim.plugins.returned import NotAForce, two_parts
 from mbsim.plugins.source.find import find_either
 from mbsim.plugins.source.native import asks, native
 from mbsim.plugins.source.octave import end_all
-from mbsim.plugins.source.script import Scripts, user_function
+from mbsim.plugins.source.script import Scripts, require, user_function
 from mbsim.plugins.source.shared_library import Library
 
 
@@ -68,9 +69,15 @@ class UserSubroutine:
 
 
 def load_subroutine(
-    each: Wanted, plugin_files: Sequence[Path], scripts: Scripts, deck: str = ""
+    each: Wanted,
+    plugin_files: Sequence[Path],
+    scripts: Scripts,
+    deck: str = "",
+    span: tuple[float, float] = (0.0, 1.0),
 ) -> UserSubroutine:
     """Return the subroutine of an element; messages name the element as the file `deck` does.
+
+    `span`: the times over which the deck runs.
 
     Raises
     ------
@@ -81,17 +88,26 @@ def load_subroutine(
     prefix = "ROUTINE" if is_adams(deck) else "usrsub"
     parts = _parts(each)
     script = find_either(user, user.fnc_name, title, prefix, plugin_files, scripts)
+
+    def named(name: str, *parts: int) -> Callable[..., Any]:
+        if isinstance(script, Library):
+            return native(script, name, prefix, user.language, *parts)[0]
+        require(script, name, title, prefix if prefix == "ROUTINE" else f"{prefix}_fnc_name")
+        return user_function(script, name, title, each.call.value)
+
     if isinstance(script, Library):
         function, how = native(script, user.fnc_name, prefix, user.language, *parts)
         looks = asks(script)
     else:
-        function = user_function(script, user.fnc_name, title, each.call.value)
+        function = named(user.fnc_name)
         looks, how = script.looks, "interpreted"
     place = user.fnc_name, str(script.path)
     if isinstance(user, StateSubroutine):
         function, looks = of_states(function, user), True
+    elif isinstance(user, RelationSubroutine):
+        function = related(function, user, script, named, span)
     address, keep = guard.state_callback(function, title, place, each)
-    looks = looks and each.call is not Call.MOTION
+    looks = looks and each.call not in (Call.MOTION, Call.RELATION)
     return UserSubroutine(
         address,
         each.results,
@@ -109,6 +125,8 @@ def _parts(each: Wanted) -> tuple[int, ...]:
     """Return how many numbers a subroutine of a library writes, array by array."""
     if isinstance(each.user, StateSubroutine):
         return len(each.user.state_ids), each.user.outputs
+    if isinstance(each.user, RelationSubroutine):
+        return (1,)
     return (1 if each.call is Call.MOTION else each.results,)
 
 

@@ -29,9 +29,14 @@ from mbsim.reader.kinds import (
     keyword,
 )
 from mbsim.reader.statement import MARKERS, NAMED, Entry, Spec, Statement
-from mbsim.reader.subroutine import GIVEN_BY, USERSUB, expression_or_user
+from mbsim.reader.subroutine import (
+    GIVEN_BY,
+    USERSUB,
+    expression_or_user,
+    relation,
+    subroutine,
+)
 
-_COUSUB = "COUSUB is not built; give coefficients, or a Constraint_General with the relation"
 _NOT_BUILT = "is documented but not built yet"
 #: What only some joints have; DISTANCE may have a length, the others must have theirs.
 _OF_SOME_JOINTS = {"pitch": "SCREW", "pitch_diameter": "RACK_PINION", "length": "DISTANCE"}
@@ -93,7 +98,9 @@ def _build_coupler(entry: Entry) -> None:
     if any(entry.given(name) for name in _BY_JOINT):
         _build_coupler_by_joint(entry)
         return
-    for name in ("joint_ids", "motion_types", "scales"):
+    needed = ["joint_ids", "motion_types", "scales"]
+    user = _relation(entry, needed, "scales")
+    for name in needed:
         if not entry.given(name):
             entry.fault(f"{name}: missing; must be {_kind(entry, name)}")
     ids = entry.get("joint_ids", ())
@@ -114,9 +121,23 @@ def _build_coupler(entry: Entry) -> None:
         joint_ids=ids,
         motion_types=entry.get("motion_types", ()),
         scales=entry.get("scales", ()),
+        user=None if user is None else relation(user, len(ids)),
         source=entry.source,
     )
     entry.register(entry.draft.couplers, coupler)
+
+
+def _relation(entry: Entry, needed: list[str], scales: str) -> el.Subroutine | None:
+    """Return the subroutine of a coupler, where one gives it; then no scales are needed."""
+    if not any(map(entry.given, USERSUB)):
+        return None
+    needed.remove(scales)
+    if entry.given(scales):
+        entry.fault("this coupler is given by a user subroutine; must not be there", scales)
+    if not entry.given("usrsub_param_string"):
+        kind = entry.statement.attributes["usrsub_param_string"].kind
+        entry.fault(f"usrsub_param_string: missing; must be {kind.allowed}")
+    return subroutine(entry, "usrsub", "COUSUB")
 
 
 def _build_coupler_by_joint(entry: Entry) -> None:
@@ -125,16 +146,18 @@ def _build_coupler_by_joint(entry: Entry) -> None:
         if entry.given(name):
             entry.fault("goes with joint_ids, motion_types and scales, not with joint1_id", name)
     third = ("joint3_id", "freedom_3")
-    needed = [*_BY_JOINT[:4], *(third if any(map(entry.given, third)) else ()), "coefficients"]
+    joints = [*_BY_JOINT[:4], *(third if any(map(entry.given, third)) else ())]
+    needed = [*joints, "coefficients"]
+    user = _relation(entry, needed, "coefficients")
     for name in needed:
         if not entry.given(name):
             entry.fault(f"{name}: missing; must be {_kind(entry, name)}")
-    ids = [entry.get(name) for name in needed[:-1:2]]
-    types = [entry.get(name) for name in needed[1:-1:2]]
-    scales = entry.get("coefficients")
+    ids = [entry.get(name) for name in joints[::2]]
+    types = [entry.get(name) for name in joints[1::2]]
+    scales = () if user else entry.get("coefficients")
     if None in (*ids, *types, scales):
         return
-    if len(scales) != len(ids):
+    if len(scales) != len(ids) and user is None:
         entry.fault(f"must have one value for each of the {len(ids)} joints", "coefficients")
     if any(scale == 0.0 for scale in scales):
         entry.fault("must be numbers other than 0", "coefficients")
@@ -144,6 +167,7 @@ def _build_coupler_by_joint(entry: Entry) -> None:
         joint_ids=tuple(ids),
         motion_types=tuple(types),
         scales=scales,
+        user=None if user is None else relation(user, len(ids)),
         source=entry.source,
     )
     entry.register(entry.draft.couplers, coupler)
@@ -262,10 +286,10 @@ CONSTRAINT_COUPLER = Statement(
         "motion_types": Spec(WORDS, "R or T, one for each joint, as a list"),
         "scales": Spec(REALS, "coefficients that go with joint_ids"),
         "is_virtual": Spec(FLAG, refused="virtual couplers are not built", harmless="false"),
-        **{name: Spec(refused=_COUSUB) for name in USERSUB},
+        **USERSUB,
     },
     _build_coupler,
-    about="a linear relation between displacements of joints",
+    about="a relation of joints, linear or by a subroutine",
 )
 CONSTRAINT_GENERAL = Statement(
     "Constraint_General",

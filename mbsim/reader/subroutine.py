@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import fields
 from pathlib import Path
 
 from mbsim.expressions.tree import Expression, UserResult
@@ -119,6 +120,20 @@ def by_user(entry: Entry, expressions: tuple[str, ...] = ("expr",), type: str = 
     if not user and not found and len(expressions) == 1:
         entry.fault(f"{expressions[0]}: missing; must be an expression, or usrsub_param_string")
     return user
+
+
+def relation(user: el.Subroutine, count: int) -> el.RelationSubroutine:
+    """Return the subroutine of a relation of so many displacements: COUSUB, COUXX and COUXX2.
+
+    Where it has another name, those of derivatives are this with XX and XX2 behind.
+    """
+    name = "COU" if user.fnc_name == "COUSUB" else user.fnc_name
+    return el.RelationSubroutine(
+        **{each.name: getattr(user, each.name) for each in fields(el.Subroutine)},
+        count=count,
+        first=f"{name}XX",
+        second=f"{name}XX2",
+    )
 
 
 def result(entry: Entry, statement: str, user: el.Subroutine, component: int = 0) -> Expression:

@@ -56,6 +56,7 @@ PARTS_OF_SCENE = {
     Hook.ELEMENT: "forces",
     Hook.JOINTS: "joints",
     Hook.HIGHER_PAIRS: "joints",
+    Hook.RELATIONS: "joints",
     Hook.STICKING: "joints",
     Hook.REACTION_FORCES: "joints",
     Hook.EVALUATE: "evaluation",

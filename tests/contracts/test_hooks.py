@@ -12,7 +12,7 @@ from numba import types
 import mbsim
 from helpers import mechanism_decks, pile_decks
 from helpers.decks import COULOMB, GRAVITY, GROUND, contact, write_deck
-from helpers.folders import MODELS
+from helpers.folders import CORPUS, MODELS
 from helpers.mechanics import Body
 from helpers.surfaces import IMPACT, angle_on_ground
 from mbsim.arrays.codes import NEAR_FOLD
@@ -68,6 +68,7 @@ CASES = [
         (Hook.STICKING, what, "pulled" if what is Sticking.LOAD else "stiction_rigid", "RADAU5")
         for what in Sticking
     ),
+    (Hook.RELATIONS, None, "coupler_user", "DOPRI5"),
     (Hook.REACTION_FORCES, None, "pin", "DOPRI5"),
     (Hook.EVALUATE, None, "dry_friction_element", "DOPRI5"),
     (Hook.BEND, None, "four_bar", "RADAU5"),
@@ -129,7 +130,7 @@ def _contact_set():
 
 
 def model_of(deck, folder):
-    """Return the model of a deck of `models/`, or of one above."""
+    """Return the model of a deck of `models/` or of the corpus, or of one above."""
     made = {
         "pin": _pin,
         "pulled": _pulled,
@@ -137,8 +138,10 @@ def model_of(deck, folder):
         "cylinder": _cylinder,
         "angle": lambda: angle_on_ground(0.0501, IMPACT),
     }
-    path = write_deck(folder, made[deck]()) if deck in made else MODELS / f"{deck}.xml"
-    return mbsim.read_model(path)
+    if deck in made:
+        return mbsim.read_model(write_deck(folder, made[deck]()))
+    path = MODELS / f"{deck}.xml"
+    return mbsim.read_model(path if path.is_file() else CORPUS / path.name)
 
 
 def c_type(kind):

@@ -211,4 +211,7 @@ CASES: dict[str, Callable[[Path], Case]] = {
     "Adams, gears": of_corpus("adams_gear.acf", "10"),
     "Adams, contact": of_corpus("adams_contact.adm", "20"),
     "Force_Field": of_corpus("force_field.xml", "100"),
+    "Force_MultiPoint": of_corpus("force_multipoint.xml", "100"),
+    "GSE, states of a subroutine": of_corpus("gse.xml", "40"),
+    "coupler by a subroutine": of_corpus("coupler_user.xml", "20"),
 }

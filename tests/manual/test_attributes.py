@@ -152,7 +152,7 @@ _OF_USERS = ("usrsub", "script", "interpreter")
 #: Statements that an expression gives in this deck, and not a subroutine.
 _BY_EITHER = (
     *("Force_Scalar_TwoBody", "Reference_Variable", "Control_Diff", "Motion_Joint"),
-    *("Motion_Marker", "Sensor_Event", "Sensor_Evaluate"),
+    *("Motion_Marker", "Sensor_Event", "Sensor_Evaluate", "Constraint_Coupler"),
 )
 
 

@@ -1,6 +1,7 @@
 """Constraint equations that the tree does not hold: their rows, and the multipliers they need.
 
-An equation g(q, t) = 0 is a sum of terms less a function of TIME. For each its residual, the
+An equation g(q, t) = 0 is a sum of terms less a function of TIME, or a user's relation of terms.
+For each its residual, the
 rate G V - dg/dt and what of the second rate follows from velocities alone are taken; a term's
 gradient is a wrench on the bodies of its markers. The tree answers a unit multiplier of equation
 r with accelerations T G_r', and A = G T G' says how equations act on each other, so
@@ -36,10 +37,10 @@ from mbsim.arrays.codes import (
     TWIST,
     USUAL,
 )
-from mbsim.arrays.hooks import Hook, Sticking, answer_of
+from mbsim.arrays.hooks import Hook, Sticking, answer_of, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
-from mbsim.core.arrays import F1, F2
+from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, vector
 from mbsim.dynamics.constraints.folding import SAMPLED, is_sticking, near_fold, passes_fold
@@ -78,6 +79,25 @@ def fill_equation(scene: Scene, t: float, y: F1, e: int) -> None:
 
 
 @jitable
+def plain_term(scene: Scene, y: F1, k: int, anew: int) -> V3:
+    """Return value, rate and second rate of a term of poses alone, and fill its gradient."""
+    eq, sweep = scene.equations, scene.sweep
+    i, j, kind, G = eq.i[k], eq.j[k], eq.kind[k], sweep.G[k]
+    if kind == OFFSET:
+        return offset_term(scene, y, i, j, eq.axis[k, AXIS_J], G)
+    if kind == PERP:
+        return perp_term(scene, y, i, j, eq.axis[k, AXIS_I], eq.axis[k, AXIS_J], G)
+    if kind == ANGLE:
+        return angle_term(scene, y, i, j, eq.angle[k], G)
+    if kind == TWIST:
+        return twist_term(scene, y, i, j, G)
+    if kind == HIGHER_PAIR:
+        call_int(scene.world.hooks[Hook.HIGHER_PAIRS], (scene, k, anew, y))
+        return sweep.pair[PAIR_VALUE], sweep.pair[PAIR_RATE], sweep.pair[PAIR_SECOND]
+    return distance_term(scene, y, i, j, G)
+
+
+@jitable
 def fill_terms(scene: Scene, t: float, y: F1, e: int, anew: int) -> None:
     """Do the same; with `anew` 0 a higher pair touches where its equation before this found."""
     eq, sweep = scene.equations, scene.sweep
@@ -91,27 +111,20 @@ def fill_terms(scene: Scene, t: float, y: F1, e: int, anew: int) -> None:
         if kind == TOUCHING:
             flow, second = touching_term(scene, y, i, j, eq.axis[k, AXIS_I], eq.axis[k, AXIS_J], G)
             continue
-        g, dg, ddg = 0.0, 0.0, 0.0
-        if kind == OFFSET:
-            g, dg, ddg = offset_term(scene, y, i, j, eq.axis[k, AXIS_J], G)
-        elif kind == PERP:
-            g, dg, ddg = perp_term(scene, y, i, j, eq.axis[k, AXIS_I], eq.axis[k, AXIS_J], G)
-        elif kind == ANGLE:
-            g, dg, ddg = angle_term(scene, y, i, j, eq.angle[k], G)
-        elif kind == TWIST:
-            g, dg, ddg = twist_term(scene, y, i, j, G)
-        elif kind == HIGHER_PAIR:
-            call_int(scene.world.hooks[Hook.HIGHER_PAIRS], (scene, k, anew, y))
-            g, dg = sweep.pair[PAIR_VALUE], sweep.pair[PAIR_RATE]
-            ddg = sweep.pair[PAIR_SECOND]
-        else:
-            g, dg, ddg = distance_term(scene, y, i, j, G)
+        g, dg, ddg = plain_term(scene, y, k, anew)
+        if eq.user[e] > 0:
+            of_term = sweep.related[k - eq.first[e]]
+            of_term[PAIR_VALUE], of_term[PAIR_RATE], of_term[PAIR_SECOND] = g, dg, ddg
         value += factor * g
         flow += factor * dg
         second += factor * ddg
         if factor != 1.0:
             for c in range(12):
                 G[c] *= factor
+    if eq.user[e] > 0:
+        note_failure(scene, call_int(scene.world.hooks[Hook.RELATIONS], (scene, t, y, e)))
+        value, flow = sweep.pair[PAIR_VALUE], sweep.pair[PAIR_RATE]
+        second = sweep.pair[PAIR_SECOND]
     rate = flow
     if eq.program[e] >= 0:
         f, df, ddf = jet(scene, t, y, eq.program[e])

@@ -187,8 +187,8 @@ def couple_equations(scene: Scene, P: Pattern) -> bool:
 def terms_behind(scene: Scene, e: int, term: int) -> tuple[int, int]:
     """Return the range of terms on whose bodies the gradient of a term depends."""
     eq = scene.equations
-    if eq.general[e] == 1:
-        # one term for each body of one expression
+    if eq.general[e] == 1 or eq.user[e] > 0:
+        # one term for each body of one expression, or terms of one relation
         return eq.first[e], eq.first[e + 1]
     return term, term + 1
 
@@ -323,6 +323,16 @@ def bend_by(scene: Scene, T: Tangent, t: float, y: F1, row: int, e: int, term: i
 
 
 @jitable
+def among(scene: Scene, first: int, end: int, b: int) -> bool:
+    """Return whether body b is one of those of the terms from `first` to before `end`."""
+    eq, body = scene.equations, scene.markers.body
+    for k in range(first, end):
+        if body[eq.i[k]] == b or body[eq.j[k]] == b:
+            return True
+    return False
+
+
+@jitable
 def add_bends(scene: Scene, T: Tangent, t: float, y: F1) -> None:
     """Add how the forces of equations turn with the bodies that they are fixed to."""
     eq = scene.equations
@@ -336,7 +346,8 @@ def add_bends(scene: Scene, T: Tangent, t: float, y: F1) -> None:
             for by in range(first, end):
                 for side in range(2):
                     b = scene.markers.body[eq.i[by] if side == 0 else eq.j[by]]
-                    if b < len(scene.bodies.mass) and on_tree(scene, b):
+                    named = first < by and among(scene, first, by, b)
+                    if b < len(scene.bodies.mass) and on_tree(scene, b) and not named:
                         bend_by(scene, T, t, y, row, e, term, b)
         fill_equation(scene, t, y, e)
 

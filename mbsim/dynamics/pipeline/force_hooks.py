@@ -11,6 +11,7 @@ from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.angles import commit_angles, longest_turn
 from mbsim.dynamics.expressions.interpreter import interpret
 from mbsim.dynamics.expressions.jets import fill_values
+from mbsim.dynamics.expressions.relations import relate
 from mbsim.dynamics.expressions.states import add_slopes
 from mbsim.dynamics.expressions.values import evaluate_program
 from mbsim.dynamics.forces.applied import add_applied, serve_kept
@@ -121,6 +122,12 @@ def fill_higher_pair(context: int, k: int, anew: int, y: Pointer) -> int:
     scene = view(context, Scene)
     fill_pair(scene, k, anew, vector_at(y, scene.rows.y.shape[1]))
     return 0
+
+
+def relate_terms(context: int, t: float, y: Pointer, e: int) -> int:
+    """An equation that is a user's relation of its terms."""
+    scene = view(context, Scene)
+    return relate(scene, t, vector_at(y, scene.rows.y.shape[1]), e)
 
 
 def serve_dry_alone(context: int, what: int, t: float, y: Pointer) -> int:

@@ -114,14 +114,6 @@ def _fixes_steps(scene: Scene, method: Method) -> bool:
     return _has_contacts(scene, method) and scene.world.fixed_step[0] == 1
 
 
-def _has_fcl_pairs(scene: Scene, method: Method) -> bool:
-    return bool((scene.kinds.kernel == 0).any())
-
-
-def _has_programs(scene: Scene, method: Method) -> bool:
-    return len(scene.programs.start) > 1
-
-
 def _needs_jets(scene: Scene, method: Method) -> bool:
     """Equations need them, and slopes of forces."""
     if (scene.equations.program >= 0).any():
@@ -295,7 +287,7 @@ TABLE = (
     Row(
         Hook.VALUE,
         _T(_INT, _T, _PTR, _INT),  # context, t, y, program
-        _has_programs,
+        lambda scene, method: len(scene.programs.start) > 1,
         _of("pipeline.force_hooks", "evaluate_expression"),
         "evaluates an expression",
         "the value; a user's subroutine that fails notes its code, and the value is nan",
@@ -350,6 +342,13 @@ TABLE = (
         _of("pipeline.force_hooks", "fill_higher_pair"),
         "fills a term of an equation of a higher pair",
         "0; it cannot fail",
+    ),
+    Row(
+        Hook.RELATIONS,
+        _INT(_INT, _T, _PTR, _INT),  # context, t, y, equation
+        _any("equations", "user"),
+        _of("pipeline.force_hooks", "relate_terms"),
+        "makes the sum of an equation's terms a user's relation of them",
     ),
     Row(
         Hook.REACTION_FORCES,
@@ -445,7 +444,7 @@ TABLE = (
     Row(
         Hook.FCL_POINTS,
         _T(_INT, _INT, _INT, _T, _PTR),  # context, request, slot or pair, h, y
-        _has_fcl_pairs,
+        lambda scene, method: bool((scene.kinds.kernel == 0).any()),
         _of("pipeline.contact_hooks", "serve_fcl_points"),
         "looks at points of pairs without a closed form: `FclPoints`",
         "a number; it cannot fail",

@@ -1,6 +1,8 @@
-"""COUPLER and GEAR of an Adams deck: linear relations between displacements of joints."""
+"""COUPLER and GEAR of an Adams deck: relations between displacements of joints."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,9 +12,10 @@ from mbsim.reader.adm.declare import (
     EXPRESSION_OR_USER,
     IDS_BY_COMMAS,
     NUMBERS,
-    ROUTINE,
+    ROUTINES,
     AdmStatement,
 )
+from mbsim.reader.adm.subroutine import as_attributes, routine
 from mbsim.reader.adm.translate import written
 from mbsim.reader.constraints import CONSTRAINT_COUPLER
 from mbsim.reader.draft import GearDraft
@@ -20,8 +23,6 @@ from mbsim.reader.gears import UnfitGearError, coupler
 from mbsim.reader.kinds import ID, BadValueError, Kind
 from mbsim.reader.parse import Attribute, Node
 from mbsim.reader.statement import Entry, Spec
-
-_NOT_BUILT = "is documented but not built yet"
 
 
 def _parse_types(text: str) -> tuple[str, ...]:
@@ -52,19 +53,45 @@ def _moves(entry: Entry, ids: tuple[int, ...]) -> tuple[str, ...] | None:
 def build_coupler(entry: Entry) -> None:
     """Add a coupler."""
     ids, scales = entry.get("JOINTS"), entry.get("SCALES")
-    if ids is None or scales is None:
+    user = routine(entry, "COUSUB")
+    if entry.given("FUNCTION") == entry.given("SCALES"):
+        entry.fault("SCALES or FUNCTION=USER(...): one of both must be there")
+    if ids is None or (scales is None and user is None):
+        if entry.given("FUNCTION") and user is None and entry.get("FUNCTION") is not None:
+            entry.fault("must be USER(number, number, ...)", "FUNCTION")
         return
-    if len(scales) == len(ids) - 1:
-        scales = (1.0, *scales)  # the first is 1 where it is left out
     types = entry.get("TYPE") or _moves(entry, ids)
     if types is None:
         return
-    entry.note("the sum is held at what the parts give as placed, as Adams' is where they fit")
+    values = {"joint_ids": ids, "motion_types": types}
+    if user is None:
+        if len(scales) == len(ids) - 1:
+            scales = (1.0, *scales)  # the first is 1 where it is left out
+        entry.note("the sum is held at what the parts give as placed, as Adams' is where they fit")
+        values["scales"] = scales
     node = Node("Constraint_Coupler", entry.node.line)
-    values = {"joint_ids": ids, "motion_types": types, "scales": scales}
     node.attributes = [a for a in entry.node.attributes if a.name == "id"]
     node.attributes += [Attribute(n, written(v), entry.node.line) for n, v in values.items()]
+    if user is not None:
+        given = as_attributes(user, "usrsub").items()
+        node.attributes += [Attribute(n, v, entry.node.line) for n, v in given]
     CONSTRAINT_COUPLER.read(node, entry.draft)
+    if len(entry.get("ROUTINE", ())) > 1:
+        _name_derivatives(entry)
+
+
+def _name_derivatives(entry: Entry) -> None:
+    """Let a coupler's derivatives be by the functions that its ROUTINE names."""
+    of, *others = (text.rpartition("::") for text in entry.get("ROUTINE"))
+    for file, _, _ in others:
+        if file not in ("", of[0]):
+            entry.fault(f"must be in one file; {file} is not that of {of[2]}", "ROUTINE")
+            return
+    made = entry.draft.couplers.get(entry.get("id", 0))
+    if made is not None and made.user is not None:
+        first, second = (name for _, _, name in others)
+        user = replace(made.user, first=first, second=second, named=True)
+        entry.draft.couplers[made.id] = replace(made, user=user)
 
 
 COUPLER = AdmStatement(
@@ -73,9 +100,9 @@ COUPLER = AdmStatement(
         "id": Spec(ID, required=True),
         "JOINTS": Spec(IDS_BY_COMMAS, required=True),
         "TYPE": Spec(_TYPES),
-        "SCALES": Spec(NUMBERS, required=True),
-        "FUNCTION": Spec(EXPRESSION_OR_USER, refused=f"{_NOT_BUILT}; give SCALES"),
-        "ROUTINE": Spec(ROUTINE, refused=f"{_NOT_BUILT}; give SCALES"),
+        "SCALES": Spec(NUMBERS),
+        "FUNCTION": Spec(EXPRESSION_OR_USER),
+        "ROUTINE": Spec(ROUTINES),
     },
     build_coupler,
     xml="Constraint_Coupler",

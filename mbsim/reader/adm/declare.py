@@ -118,8 +118,17 @@ def _parse_routine(text: str) -> str:
     return text
 
 
+def _parse_routines(text: str) -> tuple[str, ...]:
+    """Return one function or three, separated by commas."""
+    words = tuple(_parse_routine(word.strip()) for word in text.split(","))
+    if len(words) not in (1, 3):
+        raise BadValueError
+    return words
+
+
 EXPRESSION_OR_USER = Kind("an expression, or USER(number, number, ...)", _parse_either)
 ROUTINE = Kind("a function's name, or FILE.py::NAME or LIBRARY.so::NAME", _parse_routine)
+ROUTINES = Kind(f"one or three functions, named as {ROUTINE.allowed}, {LIST}", _parse_routines)
 IDS_BY_COMMAS = Kind(f"ids {LIST}", _parse_ids)
 ANGLE = Kind("an angle (radians, or degrees with a D as in 90D)", parse_angle)
 ANY = Kind(f"items {LIST}", str)

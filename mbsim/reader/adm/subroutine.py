@@ -16,7 +16,7 @@ def routine(entry: Entry, default: str, of: str = "") -> el.Subroutine | None:
     """Return the subroutine of a statement, None where its FUNCTION is none or is faulty.
 
     `default` is the name of the function where ROUTINE is not given, `of` what stands before both
-    words, as NORMAL_ does.
+    words, as NORMAL_ does. Of several functions it is the first.
     """
     function, named = f"{of}FUNCTION", f"{of}ROUTINE"
     par = entry.get(function)
@@ -24,7 +24,8 @@ def routine(entry: Entry, default: str, of: str = "") -> el.Subroutine | None:
         if entry.given(named) and (par is not None or not entry.given(function)):
             entry.fault(f"belongs to {function}=USER(...), which is not given", named)
         return None
-    file, _, name = entry.get(named, "").rpartition("::")
+    given = entry.get(named, "")
+    file, _, name = (given if isinstance(given, str) else given[0]).rpartition("::")
     if not entry.given(named):
         entry.note(f"not given; taken as {default}", named)
     script = ""
