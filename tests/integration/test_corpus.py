@@ -22,6 +22,8 @@ import pytest
 import mbsim
 from helpers.folders import CORPUS
 from mbsim.errors import DeckError
+from mbsim.reader.adm.statements import STATEMENTS as ADAMS_STATEMENTS
+from mbsim.reader.statements import STATEMENTS
 
 _CHECK = re.compile(r"check: (\d+)\.F(\d) at (\S+) = (\S+) within (\S+)")
 _LINEAR = re.compile(r"linear: (\d+) (\w+) = (.+) within (\S+)")
@@ -95,6 +97,23 @@ def test_a_deck_is_refused_by_name_and_line(path: Path) -> None:
     said = str(caught.value).splitlines()
     for line, words in _REFUSED.findall(path.read_text("utf-8")):
         assert any(f"{path.name}:{line}: " in each and words in each for each in said), words
+
+
+@pytest.mark.parametrize(
+    ("statements", "suffixes", "form"),
+    [
+        (STATEMENTS, (".xml",), r"<{}\b"),
+        (ADAMS_STATEMENTS, (".adm", ".acf"), r"(?im)^\s*{}\b"),
+    ],
+    ids=["MotionSolve", "Adams"],
+)
+def test_every_statement_is_in_a_deck_that_runs(
+    statements: Any, suffixes: tuple[str, ...], form: str
+) -> None:
+    texts = [p.read_text("utf-8") for p in CORPUS.iterdir() if p.suffix in suffixes]
+    texts = [text for text in texts if not _REFUSED.search(text)]
+    names = [each.name for each in statements]
+    assert [name for name in names if not any(re.search(form.format(name), t) for t in texts)] == []
 
 
 def test_every_deck_has_a_reference() -> None:
