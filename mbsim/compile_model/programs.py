@@ -185,7 +185,13 @@ class ProgramTable:
         contacts: Sequence[int] = (),
     ) -> Programs:
         """Return the programs; force measures find their rows by (statement, id) in these lists."""
-        rows = {element: (1, k) for k, element in enumerate(applied)}
+        # those of vector forces take forces on one body too
+        rows = {
+            ("VECTORFORCE", id): (1, k)
+            for k, (kind, id) in enumerate(applied)
+            if kind == "BODYFORCE"
+        }
+        rows.update({element: (1, k) for k, element in enumerate(applied)})
         rows.update({element: (0, k) for k, element in enumerate(connections)})
         rows.update({("CONTACT", id): (2, k) for k, id in enumerate(contacts)})
         self.element_rows = rows

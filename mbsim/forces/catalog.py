@@ -72,7 +72,7 @@ class Parameter(NamedTuple):
     positive: bool = False  # else it may be 0 as well
     signed: bool = False  # else it may not be negative
     count: int = 1  # type: ignore[assignment]  # hides a method of tuples
-    alias: str = ""
+    alias: str = ""  # other names, separated by blanks
     words: tuple[str, ...] = ()
     others: Mapping[str, str] = {}  # other spellings of a word, separated by blanks
     kind: str = ""  # what it is if neither number nor word: a name that the reader knows

@@ -117,9 +117,15 @@ def wanted(model: Model) -> Iterator[Wanted]:
         yield sensor.source, name, "evaluate_id", sensor.evaluate_id, "Sensor_Evaluate"
     for source, name, attribute, expression in expressions(model):
         for id, statement in _used(expression):
-            if statement == "Sensor_Event" and model.evaluations:
-                statement = "Sensor_Evaluate"
-            yield source, name, attribute, id, statement
+            yield source, name, attribute, id, _other_statement(model, id, statement)
+
+
+def _other_statement(model: Model, id: int, statement: str) -> str:
+    """Return of which statement an expression's id is, where several share a function."""
+    if statement == "Sensor_Event" and model.evaluations:
+        return "Sensor_Evaluate"
+    alone = id in model.body_forces and id not in model.vector_forces
+    return "Force_Vector_OneBody" if alone and statement == "Force_Vector_TwoBody" else statement
 
 
 def expressions(model: Model) -> Iterator[tuple[Source, str, str, Expression]]:

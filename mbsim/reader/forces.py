@@ -43,6 +43,9 @@ _KINDS = {
     "law of limits": keyword(CNF_OF_LIMITS),
 }
 
+#: Why what some decks say beside the markers does nothing.
+_OF_MARKERS = "the bodies are those of the markers"
+
 
 def kind_of(parameter: Parameter) -> Kind:
     """Return what an attribute may be, or one number of it."""
@@ -193,6 +196,8 @@ def _statement(kind: ForceKind) -> Statement:
         attributes |= MARKERS
     for each in reading.attributes if reading else kind.parameters:
         attributes |= _spec(each)
+    if "i_marker_id" in attributes and "j_marker_id" in attributes:
+        attributes |= {f"body{k}_id": Spec(ID, note=_OF_MARKERS) for k in (1, 2)}
     attributes |= {name: Spec(refused=why) for name, why in kind.refused.items()}
     if isinstance(kind.form, OfResidual):
         why = "is of a shared library, which a residual cannot be in"

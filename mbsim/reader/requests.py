@@ -6,10 +6,14 @@ from mbsim.expressions.tree import Expression
 from mbsim.model import elements as el
 from mbsim.model.subroutines import RESULTS
 from mbsim.reader.keywords import BY_USERSUB, FORCE_ELEMENTS, REQUEST_TYPES
-from mbsim.reader.kinds import EXPRESSION, FLAG, ID, TEXT, keyword
+from mbsim.reader.kinds import EXPRESSION, FLAG, ID, TEXT, Kind, keyword
 from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 from mbsim.reader.subroutine import USERSUB, result, subroutine
 
+_OR_NULL = Kind(
+    "an expression, or NULL for none",
+    lambda text: None if text.strip().upper() == "NULL" else EXPRESSION.parse(text),
+)
 _EXPRESSIONS = tuple(f"expr{k}" for k in range(1, 9))
 _MARKERS = ("i_marker_id", "j_marker_id", "ref_marker_id")
 #: What each type takes; the first ones it must have.
@@ -78,7 +82,7 @@ POST_REQUEST = Statement(
         "elem_type": Spec(keyword(FORCE_ELEMENTS), "sort of the element of ELEMENTAL_FORCE"),
         "elem_id": Spec(ID, "its id"),
         "jflag": Spec(FLAG, "TRUE: what acts on J", "", "FALSE"),
-        **{name: Spec(EXPRESSION, f"F{name[-1]} of EXPRESSION", "", "0") for name in _EXPRESSIONS},
+        **{name: Spec(_OR_NULL, f"F{name[-1]} of EXPRESSION", "", "0") for name in _EXPRESSIONS},
         **USERSUB,
     },
     _build_request,

@@ -37,7 +37,7 @@ class Spec:
     note: str = ""
     refused: str = ""
     harmless: str = ""
-    alias: str = ""
+    alias: str = ""  # other names, separated by blanks
     repeats: bool = False
 
 
@@ -89,7 +89,9 @@ class Statement:
         """Return folded spelling -> attribute name, aliases and names as declared included."""
         names = {fold(name): name for name in self.attributes}
         names |= {name: name for name in self.attributes}
-        names |= {fold(s.alias): name for name, s in self.attributes.items() if s.alias}
+        names |= {
+            fold(other): name for name, s in self.attributes.items() for other in s.alias.split()
+        }
         return names
 
     @cached_property

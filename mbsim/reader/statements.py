@@ -124,7 +124,8 @@ def known_attributes(node: Node) -> list[str] | None:
     statement = BY_KEY.get(node.key)
     if statement is None or statement.any_attribute(node):
         return None
-    return [*statement.attributes, *(s.alias for s in statement.attributes.values() if s.alias)]
+    others = [name for s in statement.attributes.values() for name in s.alias.split()]
+    return [*statement.attributes, *others]
 
 
 def read_section(section: Node, draft: Draft) -> None:

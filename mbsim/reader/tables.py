@@ -194,6 +194,11 @@ REFERENCE_SPLINE = Statement(
         "points": Spec(REALS, "rows of x y, or x and one y for each z; text of the element too"),
         "file": Spec(TEXT, "file of such rows, relative to the deck", alias="file_name"),
         "linear_extrapolate": Spec(FLAG, "lines, not parabolas, outside", "", "FALSE"),
+        "block_name": Spec(TEXT, refused="SPLINE_READ is not built; give points", harmless="NULL"),
+        **{
+            name: Spec(TEXT, refused="SPLINE_READ is not built; give points or a file of them")
+            for name in (*USERSUB, "script_name", "interpreter")
+        },
     },
     _build_spline,
     text="points",

@@ -48,12 +48,20 @@ _ATTRIBUTES = (
         "expr",
         kind="expression",
         optional=True,
+        alias="val_expression val",
         about="the force, > 0 pushes apart; or the torque on I",
         unit="F or F L",
     ),
     USERS,
-    # ours; Adams' ACTIONONLY
-    Parameter("action_only", kind="flag", optional=True, about="nothing acts on J", shown="FALSE"),
+    # Adams' ACTIONONLY
+    Parameter(
+        "action_only",
+        kind="flag",
+        optional=True,
+        alias="is_action_only",
+        about="nothing acts on J",
+        shown="FALSE",
+    ),
 )
 
 

@@ -87,7 +87,7 @@ force(
     "vector_forces",
     form=Components(alone=False),
     title="vector force",
-    functions="VFORCE VTORQ GFORCE",
+    functions="VFORCE VTORQ GFORCE",  # of a Force_Vector_OneBody too
     adams=Adams("GFORCE"),
     table="vector_forces",
     reading=Reading((_I, _J, *_ATTRIBUTES), _read),
@@ -101,6 +101,6 @@ force(
     form=Components(alone=True),
     title="body force",
     table="body_forces",
-    reading=Reading((_I, *_ATTRIBUTES), _read),
+    reading=Reading((_I._replace(alias="marker_id"), *_ATTRIBUTES), _read),
     about="force and torque on one body by components",
 )

@@ -69,8 +69,8 @@ def attributes(name: str, page: Page) -> list[str]:
 
 
 def _meaning(spec: Spec) -> str:
-    also = f"; also `{spec.alias}`" if spec.alias else ""
-    return spec.about + also
+    others = " or ".join(f"`{name}`" for name in spec.alias.split())
+    return f"{spec.about}; also {others}" if others else spec.about
 
 
 def _choices(name: str, spec: Spec) -> str:
