@@ -29,7 +29,6 @@ _NAMED_BY = {
     **dict.fromkeys(("matrix", "mtx", "kmtx", "cmtx"), ("Reference_Matrix",)),
     "curve": ("Reference_ParamCurve",),
     "surface": ("Reference_ParamSurface",),
-    **dict.fromkeys(("joint1", "joint2", "joint3"), ("Constraint_Joint",)),
     "pinput": ("Control_PlantInput",),
     "poutput": ("Control_PlantOutput",),
     "evaluate": ("Sensor_Evaluate",),
@@ -120,7 +119,7 @@ def referred(statement: Statement, name: str) -> tuple[str, ...]:
     """Return the statements of which the attribute names an element, none where it names none."""
     if name == "id" or statement.attributes[name].kind not in (ID, IDS):
         return ()
-    words = name.split("_")
+    words = [word.rstrip("0123456789") for word in name.split("_")]
     found = [named for word, named in _NAMED_BY.items() if word in words]
     return found[0] if found else ()
 

@@ -43,7 +43,13 @@ _KINDS = {
     "law of limits": keyword(CNF_OF_LIMITS),
 }
 
-#: Why what some decks say beside the markers does nothing.
+#: What some decks say beside markers, and why it does nothing.
+_BODIES = (
+    ("body1_id", "i_marker_id"),
+    ("body2_id", "j_marker_id"),
+    ("body2_id", "j_floating_marker_id"),
+    ("ref_body_id", "ref_marker_id"),
+)
 _OF_MARKERS = "the bodies are those of the markers"
 
 
@@ -196,8 +202,9 @@ def _statement(kind: ForceKind) -> Statement:
         attributes |= MARKERS
     for each in reading.attributes if reading else kind.parameters:
         attributes |= _spec(each)
-    if "i_marker_id" in attributes and "j_marker_id" in attributes:
-        attributes |= {f"body{k}_id": Spec(ID, note=_OF_MARKERS) for k in (1, 2)}
+    for body, name in _BODIES:
+        if name in attributes:
+            attributes[body] = Spec(ID, note=_OF_MARKERS)
     attributes |= {name: Spec(refused=why) for name, why in kind.refused.items()}
     if isinstance(kind.form, OfResidual):
         why = "is of a shared library, which a residual cannot be in"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mbsim.model import elements as el
-from mbsim.reader.kinds import EXPRESSION
+from mbsim.reader.kinds import EXPRESSION, FLAG, TEXT
 from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 from mbsim.reader.subroutine import GIVEN_BY, USERSUB, expression_or_user
 
@@ -30,6 +30,15 @@ REFERENCE_VARIABLE = Statement(
         "type": GIVEN_BY,
         "expr": Spec(EXPRESSION, "its value"),
         **USERSUB,
+        "is_implicit": Spec(
+            FLAG,
+            refused="implicit variables are documented but not built yet",
+            harmless="false",
+        ),
+        **{
+            name: Spec(TEXT, note="belongs to implicit variables; this one is explicit")
+            for name in ("autobalance", "penalty", "penalty1", "dot_form", "ic", "static_hold")
+        },
     },
     _build_variable,
     about="an expression with a name, used as VARVAL(id)",
