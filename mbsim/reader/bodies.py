@@ -10,7 +10,7 @@ from mbsim.model import elements as el
 from mbsim.model.frames import orthonormalise, rotation_313
 from mbsim.reader import units
 from mbsim.reader.keywords import spellings
-from mbsim.reader.kinds import FLAG, ID, POSITIVE, REAL, keyword
+from mbsim.reader.kinds import FLAG, ID, POSITIVE, REAL, TEXT, keyword
 from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 
 _INERTIAS = ("inertia_xx", "inertia_yy", "inertia_zz", "inertia_xy", "inertia_yz", "inertia_xz")
@@ -204,6 +204,8 @@ BODY_RIGID = Statement(
         "lprf_id": Spec(ID, "marker in which the body's markers are given", "", "global frame"),
         "mass": Spec(POSITIVE, "mass; moving bodies need it or density", "M"),
         # ours
+        "is_wet_body": Spec(FLAG, refused="AcuSolve is not coupled", harmless="false"),
+        "cp_inp_id": Spec(TEXT, refused="AcuSolve is not coupled"),
         "density": Spec(POSITIVE, "gives mass and inertia from the body's graphics", "M/L^3"),
         **{name: Spec(REAL, _about_inertia(name), "M L^2", _no(name)) for name in _INERTIAS},
         **{name: Spec(REAL, _about_velocity(name), _speed(name), "0") for name in _VELOCITIES},

@@ -15,11 +15,16 @@ from mbsim.reader.kinds import (
     NOT_NEGATIVE,
     POSITIVE,
     REAL,
+    Kind,
     keyword,
 )
 from mbsim.reader.statement import NAMED, Entry, Spec, Statement
 from mbsim.reader.subroutine import GIVEN_BY, USERSUB, expression_or_user
 
+_CROSSING = Kind(
+    "TRUE, FALSE or a tolerance >= 0 of the crossing",
+    lambda text: NOT_NEGATIVE.parse(text) > 0.0 if text[:1].isdigit() else FLAG.parse(text),
+)
 _IMPLICIT = "an implicit equation 0 = f(z, z') is not built; solve it for z' and leave it out"
 _NO_SLOPE = "z' at the start is what expr gives; only an implicit equation has it given"
 
@@ -140,7 +145,7 @@ SENSOR_EVENT = Statement(
         "compare": Spec(keyword(_COMPARE), "how expr is held against value", "", "EQ"),
         "value": Spec(REAL, "what it is held against", "", "0"),
         "error_tol": Spec(NOT_NEGATIVE, "so far from value counts as there", "", "0"),
-        "zero_crossing": Spec(FLAG, "whether a step ends at the crossing", "", "FALSE"),
+        "zero_crossing": Spec(_CROSSING, "whether a step ends at the crossing", "", "FALSE"),
         "evaluate": Spec(EXPRESSION, "what SENVAL(id) shows from then on"),  # ours; Adams'
         "evaluate_id": Spec(ID, "the Sensor_Evaluate that SENVAL shows from then on"),
         "halt": Spec(FLAG, "end the run", "", "FALSE"),
