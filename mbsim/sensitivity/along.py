@@ -69,7 +69,13 @@ from mbsim.sensitivity.arrays import (
     UP,
     Variations,
 )
-from mbsim.sensitivity.twin import half_step, keep_change, keep_side, set_parameter
+from mbsim.sensitivity.twin import (
+    half_step,
+    keep_change,
+    keep_depths,
+    keep_side,
+    set_parameter,
+)
 
 #: Rows of `Variations.work`: a point, f on either side, D at a stage, its slopes.
 POINT, UPPER, LOWER, STAGE, FIRST = range(5)
@@ -427,6 +433,7 @@ def remember_end(
         code = call_int(p.rhs, (p.context, t + h, h, x, V.work[UPPER]))
         if code != 0:
             return code
+        keep_depths(V, twin, side)
         keep_side(V, twin, scene, side)
     keep_change(V, k, e)
     return 0

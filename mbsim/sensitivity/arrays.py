@@ -31,7 +31,9 @@ ALONG = 21
 # how many times the run's own evaluations derivatives may take each, 0: as many as they do; how
 # many that is by the end of the step that is taken
 WORTH, MOST = 22, 23
-WORDS = 24
+# the parameter by which the twin was changed last
+SET = 24
+WORDS = 25
 #: Rows of `Variations.jump`: y before the commit, f before and behind it.
 BEFORE, F_BEFORE, F_BEHIND = range(3)
 #: Contacts that may begin or end within one step.
@@ -61,6 +63,8 @@ class Variations(NamedTuple):
     jump: tags.Scratch[F2]  # (3, n) see BEFORE
     middle: tags.Scratch[F3]  # (P, ns, most) mean of both sides behind a change of branch
     mode: tags.Scratch[F1]  # (ns,) `State.mode` before it
+    reach: F1  # (P,) by how much a parameter may be changed for depths, 0: not known
+    depth: tags.Scratch[F2]  # (2, ns) how deep slots are at the end of a step on either side
     line: tags.Scratch[F1]  # (1,) length of the straight line [T]
     # (P, ns + 1) by how much slots change their branch later, by the parameter; what else does last
     shift: tags.Scratch[F2]

@@ -20,7 +20,14 @@ from mbsim.sensitivity.arrays import (
     UP,
     Variations,
 )
-from mbsim.sensitivity.twin import beside, half_step, keep_change, keep_side, set_parameter
+from mbsim.sensitivity.twin import (
+    beside,
+    half_step,
+    keep_change,
+    keep_depths,
+    keep_side,
+    set_parameter,
+)
 
 
 @jitable
@@ -36,6 +43,7 @@ def step_beside(
     code = call_int(p.rhs, (p.context, t, 0.0, own.y, own.k[0]))
     if code == 0:
         code = call_int(V.words[ATTEMPT], (workspace, t, h, own.y, own.trial))
+    keep_depths(V, twin, side)
     if code == 0 and V.words[REMEMBERED] > 0:
         keep_side(V, twin, scene, side)
     return code

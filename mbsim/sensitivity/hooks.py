@@ -76,7 +76,7 @@ from mbsim.sensitivity.events import (
 )
 from mbsim.sensitivity.explicit import explicit_step, fit_beside
 from mbsim.sensitivity.implicit import implicit_step
-from mbsim.sensitivity.twin import half_step, keep_unit, set_parameter
+from mbsim.sensitivity.twin import half_step, keep_unit, reach_of, set_parameter
 
 #: Where the packed `Variations` stand: where those of MOREAU would, which takes no part in this.
 AT = Hook.STEPPING
@@ -127,7 +127,9 @@ def carry(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) ->
     """Fill derivative k at the end of the step that is taken; return a code."""
     for s in range(len(V.seen)):
         V.seen[s] = 0
-    code = 0
+    if V.words[CHANGES] > 0:
+        V.reach[k] = 0.0
+    e, code = half_step(V, k), 0
     if V.words[ALONG] == 1:
         V.error[k] = math.inf
     elif V.words[ATTEMPT] == 0:
@@ -139,7 +141,9 @@ def carry(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) ->
         code = explicit_step(V, scene, m, t, h, k)
     if code != 0:
         return code
-    bends = V.words[CHANGES] > 0 or is_bent(V, scene) or V.error[k] > V.enough[0]
+    changes = V.words[CHANGES] > 0 or is_bent(V, scene)
+    bends = changes or V.error[k] > V.enough[0]
+    V.reach[k] = 0.0 if changes or V.words[ALONG] == 1 else reach_of(V, e)
     V.bends[k] = 1 if bends else 0
     V.words[BENT] += V.bends[k]
     if bends or (m.memory[SHOWN] == 1.0 and V.words[ATTEMPT] != 0):
@@ -152,11 +156,13 @@ def carry(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) ->
             return Code.NOT_CONVERGED
     for i in range(len(m.y)):
         V.next[k, i] = V.d[k, i]
+    e = half_step(V, k)
     code = step_along(V, scene, m, t, h, k, 1.0)
     if code == 0 and V.words[JOINTS] == 1:
-        code = project_end(V, scene, m, t + h, k, half_step(V, k))
+        code = project_end(V, scene, m, t + h, k, e)
     if code == 0 and V.words[REMEMBERED] > 0:
-        code = remember_end(V, scene, m, t, h, k, half_step(V, k))
+        code = remember_end(V, scene, m, t, h, k, e)
+        V.reach[k] = 0.0 if changes else reach_of(V, e)
     return code
 
 

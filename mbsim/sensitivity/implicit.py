@@ -22,7 +22,14 @@ from mbsim.integrators.radau5 import E as ERROR
 from mbsim.integrators.radau5 import Z as STAGES_AT
 from mbsim.integrators.scheme import FRESH, LAST_STEP, Method, in_workspace
 from mbsim.sensitivity.arrays import JOINTS, REMEMBERED, TWIN, UP, Variations
-from mbsim.sensitivity.twin import half_step, keep_change, keep_side, keep_unit, set_parameter
+from mbsim.sensitivity.twin import (
+    half_step,
+    keep_change,
+    keep_depths,
+    keep_side,
+    keep_unit,
+    set_parameter,
+)
 
 #: Rows of `Variations.stage`: stages less D, F, the right-hand sides and solutions of both systems,
 #: a point and f there.
@@ -30,9 +37,12 @@ Z, F, REAL, REAL_D, PAIR, PAIR_D, POINT, SLOPE = 0, 3, 6, 7, 8, 10, 12, 13
 STAGES = 14
 #: By how much the error of order 3 overrates that of the step.
 OVERRATED = 100.0
-#: The iteration ends at a correction of this part of the derivative, or after so many, or where
-#: they get no smaller, which is rounding where they are below the third number.
-ENOUGH, MOST, ROUNDING = 1e-10, 12, 1e-5
+#: The iteration ends at a correction of this part of the derivative; it fails after so many, and
+#: where one is more than SLOW of that before: the linearisation is that of other forces.
+ENOUGH, MOST, SLOW = 1e-10, 12, 0.5
+#: Corrections that get no smaller are rounding where they are less than so much of y in sides of a
+#: difference.
+ROUNDING = 4e-15
 
 
 @jitable
@@ -74,6 +84,7 @@ def evaluate_stages(
                 return code
             for i in range(len(m.y)):
                 V.stage[F + j, i] = part * f[i] if side == 0 else V.stage[F + j, i] - part * f[i]
+        keep_depths(V, twin, side)
         if V.words[REMEMBERED] > 0:
             keep_side(V, twin, scene, side)
     return 0
@@ -155,7 +166,9 @@ def implicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k:
     own = in_workspace(V.words[UP])[0]
     e = half_step(V, k)
     extrapolate(V, m, h, k)
-    before = math.inf
+    before, largest = math.inf, 1.0
+    for i in range(len(m.y)):
+        largest = max(largest, abs(m.y[i]) / V.scale[i])
     for iteration in range(MOST):
         code = evaluate_stages(V, scene, m, t, h, k, e)
         if code != 0:
@@ -169,9 +182,12 @@ def implicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k:
             return code
         if not size < math.inf:
             return Code.NOT_CONVERGED
-        if size <= ENOUGH * whole or (size >= 0.5 * before and size <= ROUNDING * whole):
+        if size <= ENOUGH * whole:
             break
-        if iteration + 1 == MOST and size > ROUNDING * whole:
+        slow = size > SLOW * before
+        if slow and size <= ROUNDING / e * largest:
+            break
+        if slow or iteration + 1 == MOST:
             return Code.NOT_CONVERGED
         before = size
     keep_polynomial(V, m, k)

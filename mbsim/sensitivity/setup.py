@@ -158,6 +158,8 @@ class Sensitivities:
             end=np.zeros((count, *shape)),
             middle=np.zeros((count, *shape)),
             mode=np.zeros(shape[0]),
+            reach=np.zeros(count),
+            depth=np.zeros((2, shape[0])),
             line=np.zeros(1),
             shift=np.zeros((count, shape[0] + 1)),
             asks=np.zeros(shape[0] + 1, dtype=np.int64),

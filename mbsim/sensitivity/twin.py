@@ -6,33 +6,60 @@ have the run's step, its committed contacts and its branches, so that they diffe
 
 from __future__ import annotations
 
+import math
+
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.core.memory import floats_at
-from mbsim.dynamics.contact.forces import BRANCH
+from mbsim.dynamics.contact.forces import BRANCH, DEPTH
 from mbsim.laws.catalog import UNDECIDED
-from mbsim.sensitivity.arrays import ODD, REMEMBERED, Variations
+from mbsim.sensitivity.arrays import ODD, REMEMBERED, SET, Variations
 
 #: Half of the step of differences, in usual sizes of the parameter and of y.
 STEP = 1e-6
-#: The same of places where there are contacts: depths are far smaller than the model.
-STEP_OF_CONTACTS = 1e-9
+#: The same of places where it is not known how depths of contacts move: these are far smaller than
+#: the model. Where it is known no depth changes by more than a part of itself.
+STEP_OF_CONTACTS, PART_OF_DEPTH = 1e-9, 1e-4
 
 
 @jitable
 def half_step(V: Variations, k: int) -> float:
     """Return by how much parameter k is changed to either side."""
-    largest = 1.0 / (STEP * V.size[k])
+    largest = surely = 1.0 / (STEP * V.size[k])
     for i in range(len(V.room)):
-        largest = max(largest, abs(V.d[k, i]) / V.room[i])
-    return 1.0 / largest
+        largest = max(largest, abs(V.d[k, i]) / (STEP * V.scale[i]))
+        surely = max(surely, abs(V.d[k, i]) / V.room[i])
+    return max(1.0 / surely, min(1.0 / largest, V.reach[k]))
+
+
+@jitable
+def keep_depths(V: Variations, twin: Scene, side: int) -> None:
+    """Keep how deep all slots are on one side, 0 where they do not touch."""
+    for s in range(V.depth.shape[1]):
+        V.depth[side, s] = twin.work.slot[s, DEPTH] if twin.work.touching[s] == 1 else 0.0
+
+
+@jitable
+def reach_of(V: Variations, e: float) -> float:
+    """Return by how much a parameter may be changed, by the depths of both sides of e."""
+    reach = math.inf
+    for s in range(V.depth.shape[1]):
+        up, down = V.depth[0, s], V.depth[1, s]
+        if up != down:
+            reach = min(reach, 2.0 * e * PART_OF_DEPTH * min(up, down) / abs(up - down))
+    return reach
 
 
 @jitable
 def set_parameter(V: Variations, twin: Scene, scene: Scene, k: int, e: float) -> None:
-    """Let parameter k of the twin be changed by e, and what follows from it of laws' memories."""
+    """Let parameter k of the twin, and no other, be changed by e, and laws' memories with it."""
+    last = V.words[SET]
+    if last != k:
+        for j in range(V.first[last], V.first[last + 1]):
+            floats_at(V.place[j], 1)[0] = V.base[j]
+        V.words[SET] = k
     for j in range(V.first[k], V.first[k + 1]):
         floats_at(V.place[j], 1)[0] = V.base[j] + e * V.slope[j]
     if V.words[REMEMBERED] > 0:
