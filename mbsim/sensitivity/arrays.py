@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from mbsim.core import tags
-from mbsim.core.arrays import F1, F2, F3, I1
+from mbsim.core.arrays import F1, F2, F3, I1, I2
 
 # numbers of `words`: the hooks of the run that are passed on to; tables of the run's method, of the
 # twin and of its two methods; addresses of an explicit method's functions, 0 for an implicit one;
@@ -64,6 +64,7 @@ class Variations(NamedTuple):
     middle: tags.Scratch[F3]  # (P, ns, most) mean of both sides behind a change of branch
     mode: tags.Scratch[F1]  # (ns,) `State.mode` before it
     reach: F1  # (P,) by how much a parameter may be changed for depths, 0: not known
+    odd: tags.Scratch[I2]  # (2, ns) 1 where friction asks for another branch beside the run
     depth: tags.Scratch[F2]  # (2, ns) how deep slots are at the end of a step on either side
     line: tags.Scratch[F1]  # (1,) length of the straight line [T]
     # (P, ns + 1) by how much slots change their branch later, by the parameter; what else does last

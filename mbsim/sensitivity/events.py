@@ -49,6 +49,8 @@ from mbsim.sensitivity.twin import half_step, is_asked, keep_change, keep_side, 
 #: Times of changes are looked for along a straight line as long as this part of the problem's own
 #: time; how far behind them what friction keeps is asked for, over that.
 SPAN, BEHIND = 1e-4, 1e-5
+#: A shift is known to this part of itself.
+SURE = 0.01
 #: By how much, over that, what is kept may differ between the run and both sides.
 ALIKE = 0.03
 #: So often a shorter difference is tried for the time of a change.
@@ -120,23 +122,48 @@ def ask_beside(V: Variations, scene: Scene, t: float, k: int, x: float, late: fl
 
 
 @jitable
-def note_kept(V: Variations, scene: Scene, t: float, H: float, k: int) -> None:
+def note_kept(V: Variations, scene: Scene, t: float, H: float, k: int) -> bool:
     """Find how what friction keeps where it is on another branch beside the run moves.
 
     A little before the end of the step, and nearer to the run: on another branch what a law keeps
-    is another number.
+    is another number. Else on that side of the run where it is on the run's branch. Return
+    whether there is one.
     """
     e, back, twin = half_step(V, k), BEHIND * H, view(V.words[TWIN], Scene)
     for _ in range(2 * TRIES):
         V.words[ODD] = 0
         for side in range(2):
             if ask_beside(V, scene, t, k, e if side == 0 else -e, -back) != 0:
-                return
+                return False
             keep_side(V, twin, scene, side)
         if V.words[ODD] == 0:
             keep_change(V, k, e)
-            return
+            return True
         e, back = 0.3 * e, 3.0 * back
+    return keep_one_side(V, scene, t, k)
+
+
+@jitable
+def keep_one_side(V: Variations, scene: Scene, t: float, k: int) -> bool:
+    """Find how what friction keeps moves to one side of the run; return whether that is known."""
+    e, twin = half_step(V, k), view(V.words[TWIN], Scene)
+    code = ask_beside(V, scene, t, k, 0.0, 0.0)
+    for s in range(V.far.shape[1]):
+        for j in range(V.far.shape[2]):
+            V.middle[k, s, j] = twin.work.memory[s, j] if twin.work.touching[s] == 1 else 0.0
+    for side in range(2):
+        code = code or ask_beside(V, scene, t, k, e if side == 0 else -e, 0.0)
+        keep_side(V, twin, scene, side)
+    keep_change(V, k, e)
+    for s in range(V.far.shape[1]):
+        # where both sides are on the other branch they differ as smoothly as on the run's
+        if V.odd[0, s] == V.odd[1, s]:
+            continue
+        side = 1 if V.odd[0, s] == 1 else 0
+        for j in range(V.far.shape[2]):
+            change = V.far[side, s, j] - V.middle[k, s, j]
+            V.end[k, s, j] = change / (e if side == 0 else -e)
+    return code == 0
 
 
 @jitable
@@ -145,11 +172,13 @@ def note_changed(V: Variations, scene: Scene, t: float, H: float, k: int) -> Non
 
     A little behind it, each side and each point at its own time.
     """
-    margin, e, twin = BEHIND * H, half_step(V, k), view(V.words[TWIN], Scene)
+    margin, whole, twin = BEHIND * H, half_step(V, k), view(V.words[TWIN], Scene)
     for a in range(V.asks[len(V.asks) - 1]):
         s = V.asks[a]
         if not abs(V.shift[k, s]) < math.inf:
             continue
+        # so that what the shift is off by is less than how far behind it is
+        e = min(whole, margin / (SURE * abs(V.shift[k, s]) + 1e-300))
         for side in range(2):
             x = e if side == 0 else -e
             if ask_beside(V, scene, t, k, x, margin + x * V.shift[k, s]) != 0:

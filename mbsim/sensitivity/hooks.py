@@ -50,6 +50,7 @@ from mbsim.sensitivity.arrays import (
     FITTED,
     JOINTS,
     LOST_FAILED,
+    LOST_JUMP,
     LOST_LARGE,
     LOST_WORK,
     METHOD,
@@ -181,7 +182,8 @@ def take_step(V: Variations, scene: Scene, m: Method, t: float, h: float) -> Non
         if not listed or carry(V, scene, m, t, h, k) != 0:
             lose(V, k, t, LOST_WORK if is_too_much(V) else LOST_FAILED)
         elif V.words[REMEMBERED] > 0 and V.words[ODD] == 1:
-            note_kept(V, scene, t + h, V.line[0], k)
+            if not note_kept(V, scene, t + h, V.line[0], k):
+                lose(V, k, t + h, LOST_JUMP)
         set_parameter(V, twin, scene, k, 0.0)
 
 

@@ -160,6 +160,7 @@ class Sensitivities:
             mode=np.zeros(shape[0]),
             reach=np.zeros(count),
             depth=np.zeros((2, shape[0])),
+            odd=np.zeros((2, shape[0]), dtype=np.int64),
             line=np.zeros(1),
             shift=np.zeros((count, shape[0] + 1)),
             asks=np.zeros(shape[0] + 1, dtype=np.int64),

@@ -21,7 +21,7 @@ from mbsim.sensitivity.arrays import ODD, REMEMBERED, SET, Variations
 STEP = 1e-6
 #: The same of places where it is not known how depths of contacts move: these are far smaller than
 #: the model. Where it is known no depth changes by more than a part of itself.
-STEP_OF_CONTACTS, PART_OF_DEPTH = 1e-9, 1e-4
+STEP_OF_CONTACTS, PART_OF_DEPTH = 1e-9, 1e-6
 
 
 @jitable
@@ -103,7 +103,9 @@ def keep_side(V: Variations, twin: Scene, scene: Scene, side: int) -> None:
         for j in range(V.far.shape[2]):
             V.far[side, s, j] = twin.work.memory[s, j] if touches else 0.0
         asked, goes_on = twin.work.slot[s, BRANCH], scene.state.touching[s] == 1 and touches
-        if goes_on and asked != UNDECIDED and asked != scene.state.mode[s] and not is_asked(V, s):
+        odd = goes_on and asked != UNDECIDED and asked != scene.state.mode[s] and not is_asked(V, s)
+        V.odd[side, s] = 1 if odd else 0
+        if odd:
             V.words[ODD] = 1
 
 

@@ -198,6 +198,41 @@ def test_points_of_a_block_stick_and_slip_at_its_reversals(integrator):
     assert off(run.sensitivity(signal, name), truth) < 5e-5
 
 
+@pytest.mark.parametrize("tol", [1e-7, 3e-9, 1e-9])
+def test_slow_iterations_and_slips_just_before_they_end_leave_no_trace(tol):
+    name = "Force_Contact[301].mu_dynamic"
+    how = {"end_time": 0.1, "print_interval": 0.001}
+    deck, signal = MODELS / "sdnd100.xml", "bodies/2/position/x"
+    run = mbsim.simulate(deck, integrator="RADAU5", tol=tol, sensitivity=[name], **how)
+    truth = differences(deck, name, 0.1, 1e-5, [signal], integrator="DOP853", **how)[signal]
+    assert off(run.sensitivity(signal, name), truth) < 5e-5
+
+
+@pytest.mark.parametrize("integrator", ["DOPRI5", "RADAU5"])
+def test_parameters_of_one_law_are_as_each_alone(integrator):
+    names = ["Force_Contact[301].mu_static", "Force_Contact[301].mu_dynamic"]
+    how = {"end_time": 6.0, "integrator": integrator, "tol": 1e-8, "print_interval": 0.4}
+    with run_model("belt_stick_slip.xml", sensitivity=names, **how) as run:
+        together = [run.sensitivity("bodies/2/position/x", name) for name in names]
+    for name, found in zip(names, together, strict=True):
+        with run_model("belt_stick_slip.xml", sensitivity=[name], **how) as run:
+            alone = run.sensitivity("bodies/2/position/x", name)
+            assert run.parameters[name]["known_until"] == math.inf
+            assert (found == alone).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("integrator", ["DOP853", "RADAU5"])
+def test_a_belt_through_five_sticks_and_five_slips(integrator):
+    name = "Force_Contact[301].mu_static"
+    how = {"end_time": 48.5, "print_interval": 0.4}
+    deck, signal = MODELS / "belt_stick_slip.xml", "bodies/2/position/x"
+    run = mbsim.simulate(deck, integrator=integrator, tol=1e-10, sensitivity=[name], **how)
+    truth = differences(deck, name, 1.0, 3e-4, [signal], integrator="DOP853", **how)[signal]
+    # differences themselves are off by 5e-5
+    assert off(run.sensitivity(signal, name), truth) < 3e-4
+
+
 @pytest.mark.parametrize("integrator", ["RADAU5", "GALPHA"])
 def test_a_ball_rolls_many_turns_with_an_implicit_method(integrator):
     name = "Body_Rigid[2].v_ic_x"
