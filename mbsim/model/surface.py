@@ -2,7 +2,8 @@
 
 One array holds all: a header, the boxes of a complete binary tree over the triangles, the
 triangles in the order of its leaves, a mark for each triangle that the patches use while they
-work (it is -1 in between), and for a mesh with a layer the oriented boxes of the same tree.
+work (it is -1 in between), and for a mesh with a layer the oriented boxes of the same tree and
+room for the leaves that pairs with other meshes keep (`geometry.mesh.candidates`).
 """
 
 from __future__ import annotations
@@ -16,13 +17,21 @@ from mbsim.model.surface_tree import NOTHING, level_bounds, oriented_boxes, orie
 
 #: Numbers of the header: triangles, levels of the tree below its root, where boxes, triangles,
 #: marks, oriented boxes (`model.surface_tree`), the first triangles of leaves and those of shells
-#: (what hangs together through edges) begin, length of the whole, its volume [L^3]. Behind the
-#: first triangles of shells stands the shell of each triangle.
-HEADER = 10
+#: (what hangs together through edges) and the lists of pairs begin, length of the whole, its volume
+#: [L^3]. Behind the first triangles of shells stands the shell of each triangle.
+HEADER = 11
 (
     TRIANGLES, LEVELS, AT_BOXES, AT_TRIANGLES, AT_MARKS, AT_ORIENTED, AT_LEAVES, AT_SHELLS,
-    LENGTH, SOLID,
+    AT_KEPT, LENGTH, SOLID,
 ) = range(HEADER)  # fmt: skip
+#: Lists that a mesh keeps, and pairs of leaves of one at most. Which list is given up next (TURN)
+#: stands before them. A list: what tells its pair, how far I may move from a pose until it is not
+#: known any more (below 0: it is not), for how many evaluations the next one is made, how many
+#: pairs of leaves there are, that pose of I in J's axes, the last one that was looked at, and the
+#: places of the oriented boxes of both leaves.
+LISTS, MOST_LEAVES, TURN = 4, 512, 0
+ROWS, OTHER, REACH, AHEAD, COUNT, POSE, LAST_POSE, LEAVES = 0, 1, 2, 3, 4, 5, 17, 29
+KEPT = LEAVES + 2 * MOST_LEAVES
 #: Most triangles of a leaf.
 LEAF = 4
 #: Numbers of a node (from 1; those below node k are 2 k and 2 k + 1): centre and half edges of the
@@ -149,7 +158,8 @@ def pack(
     marks = np.full(count, -1.0)
     shell = joined(np.repeat(np.arange(count), 3), beside.ravel(), count)
     shells = np.concatenate([np.unique(shell, return_index=True)[1], shell])
-    parts = [boxes.ravel(), table.ravel(), marks, oriented, starts, shells]
+    kept = np.zeros((1 + LISTS * KEPT) * layered)
+    parts = [boxes.ravel(), table.ravel(), marks, oriented, starts, shells, kept]
     at = HEADER + np.cumsum([0, *map(len, parts)])
     a, b, c = (corners - corners.mean(axis=(0, 1))).swapaxes(0, 1)
     solid = float((np.cross(a, b) * c).sum()) / 6.0

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from helpers.mesh_parts import bolt, gear
 from helpers.pairs import random_rotation
 from helpers.surfaces import Meshed, angle, box, call, incidents, torus
+from mbsim.geometry.mesh.candidates import list_of, moved_at_most
 from mbsim.geometry.mesh.distance import least_gap, triangle_distance
 from mbsim.geometry.mesh.oriented import I_IN_J, J_IN_I, box_distance, ways_between
 from mbsim.geometry.mesh.overlap import EDGES, PRISM, measure_pair_of, nodes_of, place_triangle
@@ -21,12 +23,16 @@ from mbsim.model.flat_parts import fewer_triangles
 from mbsim.model.mesh import merge_vertices
 from mbsim.model.surface import (
     AT_BOXES,
+    AT_KEPT,
     AT_ORIENTED,
     AT_TRIANGLES,
     INNER,
+    KEPT,
     LEAF,
     LEVELS,
+    LISTS,
     NODE,
+    POSE,
     TRIANGLE,
 )
 from mbsim.model.surface_tree import DEEP, FIRST, LAST, ORIENTED, ROWS, THIN
@@ -91,7 +97,7 @@ def test_boxes_with_a_common_point_have_room():
     shared = 0
     for _ in range(300):
         a, b, pose = random_node(rng), random_node(rng), random_pose(rng, 0.5)
-        room = ways_between(a, 0, b, 0, I_IN_J | J_IN_I, pose)
+        room = ways_between(a, 0, b, 0, I_IN_J | J_IN_I, pose, 0.0)
         assert room in (0, I_IN_J | J_IN_I)
         distance = box_distance(a, 0, b, 0, pose)
         assert (distance == 0.0) == (room > 0)
@@ -113,11 +119,11 @@ def test_each_way_asks_for_the_boxes_of_its_own():
     thin, deep = [0.0, 0.0, 0.0, 0.4, 1.0, 1.0], [0.0, 0.0, 0.0, 0.7, 1.0, 1.0]
     plain = np.array([*upright, *thin, *thin, 0.0, 0.0])
     layered = np.array([*upright, *thin, *deep, 0.0, 0.0])
-    assert ways_between(plain, 0, plain, 0, I_IN_J | J_IN_I, pose) == 0
-    assert ways_between(plain, 0, layered, 0, I_IN_J | J_IN_I, pose) == I_IN_J
-    assert ways_between(layered, 0, plain, 0, I_IN_J | J_IN_I, pose) == J_IN_I
-    assert ways_between(layered, 0, layered, 0, I_IN_J | J_IN_I, pose) == I_IN_J | J_IN_I
-    assert ways_between(layered, 0, layered, 0, J_IN_I, pose) == J_IN_I
+    assert ways_between(plain, 0, plain, 0, I_IN_J | J_IN_I, pose, 0.0) == 0
+    assert ways_between(plain, 0, layered, 0, I_IN_J | J_IN_I, pose, 0.0) == I_IN_J
+    assert ways_between(layered, 0, plain, 0, I_IN_J | J_IN_I, pose, 0.0) == J_IN_I
+    assert ways_between(layered, 0, layered, 0, I_IN_J | J_IN_I, pose, 0.0) == I_IN_J | J_IN_I
+    assert ways_between(layered, 0, layered, 0, J_IN_I, pose, 0.0) == J_IN_I
 
 
 @pytest.mark.parametrize("name", ["box", "angle", "torus"])
@@ -131,7 +137,7 @@ def test_the_walk_finds_all_pairs_of_triangles_that_overlap(name):
     # the torus has 256 triangles: some of them will do
     for _ in range(2 if name == "torus" else 10):
         pose, origin = random_pose(rng, 0.4 * size), (0.1 * size, 0.0, 0.0)
-        many, nodes, _, pairs = nodes_of(mesh.data, mesh.data, pose, origin)
+        many, nodes, _, pairs = nodes_of(mesh.data, mesh.data, pose, origin, np.empty((1, 1)))
         told = {tuple(pair): k for k, pair in enumerate(pairs[:many].astype(int).tolist())}
         for i in range(0, count, 3 if name == "torus" else 1):
             place_triangle(mesh.data, i, pose, True, origin, a)
@@ -142,6 +148,54 @@ def test_the_walk_finds_all_pairs_of_triangles_that_overlap(name):
                         assert nodes[told[i, j]] == pytest.approx(node, rel=1e-12, abs=1e-18)
                         found += 1
     assert found > 30
+
+
+def turned_a_little(pose, rng, size):
+    """Return a pose moved and turned by about `size` of a length of 1."""
+    by = Rotation.from_rotvec(size * rng.normal(size=3)).as_matrix()
+    turned = by @ pose[3:].reshape(3, 3)
+    return np.concatenate([pose[:3] + size * rng.normal(size=3), turned.ravel()])
+
+
+def test_what_is_kept_of_a_walk_changes_no_bit():
+    """Two pairs in turn: one moves on, and one is another mesh in the same rows now and then."""
+    angle_, box_ = (Meshed(*MESHES[name]) for name in ("angle", "box"))
+    rng, origin, rows = np.random.default_rng(11), (0.02, 0.0, 0.0), np.zeros((2, 1, 1))
+    pose, walked, pieces = np.concatenate([[0.12, 0.0, 0.0], np.eye(3).ravel()]), 0, 0
+    for step in range(24):
+        # slow, fast, at rest
+        size = (1e-4, 1e-2, 0.0)[step // 8 % 3]
+        pose = turned_a_little(pose, rng, size * 0.05)
+        for row, other in ((rows[0], angle_), (rows[step // 6 % 2], box_)):
+            fresh = Meshed.__new__(Meshed)
+            fresh.data = angle_.data.copy()
+            fresh.data[int(fresh.data[AT_KEPT]) :][: 1 + LISTS * KEPT] = 0.0
+            want = nodes_of(fresh.data, other.data, pose, origin, np.zeros((1, 1)))
+            at = list_of(angle_.data, float(row.ctypes.data), float(other.data.ctypes.data))
+            known = angle_.data[at + POSE : at + POSE + 12].copy()
+            got = nodes_of(angle_.data, other.data, pose, origin, row)
+            walked += not np.array_equal(known, angle_.data[at + POSE : at + POSE + 12])
+            assert got[0] == want[0]
+            pieces += got[0]
+            for one, two in zip(got[1:], want[1:], strict=True):
+                assert np.array_equal(one[: got[0]], two[: got[0]])
+    assert pieces > 100
+    assert walked < 32  # of 48
+
+
+def test_nearer_than_the_reach_of_a_list():
+    """No point of a mesh moves farther than is told, and some corner of its box nearly so far."""
+    mesh, rng = Meshed(*MESHES["angle"]), np.random.default_rng(3)
+    for size in (1e-6, 1e-3, 0.3):
+        before = random_pose(rng, 1.0)
+        after = turned_a_little(before, rng, size)
+        ways = [
+            np.linalg.norm((after - before)[:3] + (after - before)[3:].reshape(3, 3) @ p)
+            for p in mesh.vertices
+        ]
+        most = moved_at_most(mesh.data, before, after)
+        assert max(ways) <= most * (1.0 + 1e-12)
+        assert most <= 4.0 * max(ways)
 
 
 def test_the_bound_of_two_triangles_is_no_more_than_their_distance():

@@ -102,9 +102,15 @@ def box_distance(mesh_i: F1, i: int, mesh_j: F1, j: int, pose: F1) -> float:
 
 @jitable
 def boxes_meet(
-    off: V3, axes_i: Axes, axes_j: Axes, half_i: V3, half_j: V3, turns: tuple[V3, V3, V3]
+    off: V3,
+    axes_i: Axes,
+    axes_j: Axes,
+    half_i: V3,
+    half_j: V3,
+    turns: tuple[V3, V3, V3],
+    reach: float,
 ) -> bool:
-    """Return whether two boxes have room in common, seen along all their axes.
+    """Return whether two boxes are nearer than `reach`, seen along all their axes.
 
     `off` is the way from J's centre to I's, `turns` are the cosines of J's axes with those of I.
     """
@@ -121,12 +127,12 @@ def boxes_meet(
         abs(dot(y, off)) - (half_i[1] + (half_j[0] * a[1] + half_j[1] * b[1] + half_j[2] * c[1])),
         abs(dot(z, off)) - (half_i[2] + (half_j[0] * a[2] + half_j[1] * b[2] + half_j[2] * c[2])),
     )
-    return gap < -flush
+    return gap < reach - flush
 
 
 @jitable
-def ways_between(mesh_i: F1, i: int, mesh_j: F1, j: int, ways: int, pose: F1) -> int:
-    """Return which of `ways` the nodes at i (of I) and j (of J) have room for.
+def ways_between(mesh_i: F1, i: int, mesh_j: F1, j: int, ways: int, pose: F1, reach: float) -> int:
+    """Return for which of `ways` the nodes at i (of I) and j (of J) are nearer than `reach`.
 
     `I_IN_J` is for I's triangles in J's layer, `J_IN_I` for J's triangles in I's layer.
     """
@@ -140,11 +146,11 @@ def ways_between(mesh_i: F1, i: int, mesh_j: F1, j: int, ways: int, pose: F1) ->
     if ways & I_IN_J:
         off = offset(mesh_i, i + THIN, mesh_j, j + DEEP, pose)
         thin, deep = vector(mesh_i, i + THIN + 3), vector(mesh_j, j + DEEP + 3)
-        if boxes_meet(off, axes_i, axes_j, thin, deep, turns):
+        if boxes_meet(off, axes_i, axes_j, thin, deep, turns, reach):
             found += I_IN_J
     if ways & J_IN_I:
         off = offset(mesh_i, i + DEEP, mesh_j, j + THIN, pose)
         deep, thin = vector(mesh_i, i + DEEP + 3), vector(mesh_j, j + THIN + 3)
-        if boxes_meet(off, axes_i, axes_j, deep, thin, turns):
+        if boxes_meet(off, axes_i, axes_j, deep, thin, turns, reach):
             found += J_IN_I
     return found

@@ -1,7 +1,7 @@
 """The pieces of two meshes in each other's layers.
 
-Both trees are walked together. A node of the graph that `merging` takes is a pair of triangles,
-one of I and one of J: what the one is in the other's prism, and the other in its.
+Which leaves may have some `candidates` tells. A node of the graph that `merging` takes is a pair of
+triangles, one of I and one of J: what the one is in the other's prism, and the other in its.
 """
 
 from __future__ import annotations
@@ -13,12 +13,11 @@ import numpy as np
 from mbsim.core.arrays import F1, F2, I1, I2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import dot, sub, vector
+from mbsim.geometry.mesh.candidates import candidates
 from mbsim.geometry.mesh.oriented import (
     FLUSH,
     I_IN_J,
     J_IN_I,
-    extent,
-    node_at,
     place,
     turn,
     ways_between,
@@ -27,7 +26,6 @@ from mbsim.geometry.mesh.polygon import CORNER as POLYGON_CORNER
 from mbsim.geometry.mesh.polygon import CORNERS
 from mbsim.geometry.mesh.prism import apart, piece_in_prism
 from mbsim.geometry.mesh.record import PATCH_NUMBERS, PEAK, SUMS
-from mbsim.geometry.mesh.tree import WAITING
 from mbsim.model.surface import (
     AT_TRIANGLES,
     BESIDE,
@@ -35,15 +33,12 @@ from mbsim.model.surface import (
     DEPTH,
     INNER,
     LEAF,
-    LEVELS,
     TRIANGLE,
 )
 from mbsim.model.surface_tree import DEEP, FIRST, LAST, THIN
 
 #: Numbers of a triangle that the walk needs: corners, inner points, depths, order.
 PRISM = 24
-#: Nodes of so few triangles are looked at as leaves.
-FEW = 2
 #: Numbers of a placed box: centre, axes by rows, half edges.
 PLACED_BOX = 15
 #: Edges of a pair of triangles.
@@ -194,10 +189,10 @@ def grown(table: F2, count: int) -> F2:
 
 
 @jitable
-def nodes_of(mesh_i: F1, mesh_j: F1, pose: F1, origin: V3) -> tuple[int, F2, F2, F2]:
+def nodes_of(mesh_i: F1, mesh_j: F1, pose: F1, origin: V3, points: F2) -> tuple[int, F2, F2, F2]:
     """Return how many pairs of triangles overlap, their nodes, psi on their edges, the pairs.
 
-    Sums are in J's axes, from `origin`.
+    Sums are in J's axes, from `origin`; `points` are the pair's rows.
     """
     count, nodes, values = 0, np.empty((64, PATCH_NUMBERS)), np.empty((64, EDGES))
     pairs = np.empty((64, 2))
@@ -205,28 +200,14 @@ def nodes_of(mesh_i: F1, mesh_j: F1, pose: F1, origin: V3) -> tuple[int, F2, F2,
     placed_i, placed_j = np.empty((LEAF + 1, PRISM)), np.empty((LEAF + 1, PRISM))
     kept_i, kept_j = np.empty(LEAF + 1, np.int64), np.empty(LEAF + 1, np.int64)
     other, boxes = np.empty(EDGES), np.empty((2, PLACED_BOX))
-    waiting = np.empty((4 * WAITING, 3), np.int64)
-    waiting[0, 0], waiting[0, 1], waiting[0, 2] = 1, 1, I_IN_J | J_IN_I
-    many = 1
-    leaves_i, leaves_j = 1 << int(mesh_i[LEVELS]), 1 << int(mesh_j[LEVELS])
-    while many > 0:
-        many -= 1
-        i, j, ways = waiting[many, 0], waiting[many, 1], waiting[many, 2]
-        box_i, box_j = node_at(mesh_i, i), node_at(mesh_j, j)
-        ways = ways_between(mesh_i, box_i, mesh_j, box_j, ways, pose)
+    many, leaves = candidates(mesh_i, mesh_j, pose, points)
+    for k in range(many):
+        box_i, box_j = int(leaves[2 * k]), int(leaves[2 * k + 1])
+        ways = ways_between(mesh_i, box_i, mesh_j, box_j, I_IN_J | J_IN_I, pose, 0.0)
         if ways == 0:
             continue
         first_i, last_i = int(mesh_i[box_i + FIRST]), int(mesh_i[box_i + LAST])
         first_j, last_j = int(mesh_j[box_j + FIRST]), int(mesh_j[box_j + LAST])
-        ends_i = i >= leaves_i or last_i - first_i <= FEW
-        ends_j = j >= leaves_j or last_j - first_j <= FEW
-        if not (ends_i and ends_j):
-            of_i = not ends_i and (ends_j or extent(mesh_i, box_i) > extent(mesh_j, box_j))
-            for k in range(2):
-                waiting[many, 0], waiting[many, 1] = (2 * i + k, j) if of_i else (i, 2 * j + k)
-                waiting[many, 2] = ways
-                many += 1
-            continue
         place_boxes(mesh_j, box_j, pose, False, origin, boxes)
         place_leaf(mesh_i, box_i, pose, True, origin, ways, boxes, placed_i, kept_i)
         place_boxes(mesh_i, box_i, pose, True, origin, boxes)

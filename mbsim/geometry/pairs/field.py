@@ -65,7 +65,7 @@ def field_field(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) ->
     if gap > 0.0:
         return far_apart(gap, frame_j, points)
     origin = common_middle(mesh_i[root_i:], mesh_j[root_j:], pose)
-    count, nodes, values, pairs = nodes_of(mesh_i, mesh_j, pose, origin)
+    count, nodes, values, pairs = nodes_of(mesh_i, mesh_j, pose, origin, points)
     if count == 0:
         return without_pieces(mesh_i, mesh_j, pose, frame_j, points)
     partners = partners_of(mesh_i, mesh_j, count, values, pairs)

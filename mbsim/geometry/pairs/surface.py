@@ -58,6 +58,7 @@ from mbsim.geometry.motion import ACCELERATION, ASKED, SPIN, VELOCITY
 from mbsim.geometry.polyhedron import to_global
 from mbsim.model.surface import (
     AT_BOXES,
+    AT_KEPT,
     AT_SHELLS,
     AT_TRIANGLES,
     DEPTH,
@@ -156,7 +157,7 @@ def shell_within(mesh: F1, side: int, pairs: F2, other: F1, pose: F1) -> bool:
     axes; the mesh is I for side 0, J for side 1.
     """
     at = int(mesh[AT_SHELLS])
-    count = int(mesh[LENGTH]) - at - int(mesh[TRIANGLES])
+    count = int(mesh[AT_KEPT]) - at - int(mesh[TRIANGLES])
     for shell in range(count):
         p = vector(mesh, int(mesh[AT_TRIANGLES]) + TRIANGLE * int(mesh[at + shell]))
         p = place(pose, p) if side == 0 else place_back(pose, p)
@@ -209,7 +210,7 @@ def surface_surface(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2
         return far_apart(gap, frame_j, points)
     # the middle of what both roots have in common is near the patches
     origin = common_middle(mesh_i[root_i:], mesh_j[root_j:], pose)
-    count, nodes, values, pairs = nodes_of(mesh_i, mesh_j, pose, origin)
+    count, nodes, values, pairs = nodes_of(mesh_i, mesh_j, pose, origin, points)
     if count == 0:
         return without_pieces(mesh_i, mesh_j, pose, frame_j, points)
     pairs, inside = pairs[:count], all_in(mesh_i, mesh_j, nodes[:count])
