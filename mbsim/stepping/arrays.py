@@ -113,6 +113,8 @@ class Motion(NamedTuple):
     before: F2  # (nb + 1, 6) velocity at the step's begin
     free: F2  # (nb + 1, 6) at its end, were there no contacts
     v: F2  # (nb + 1, 6) with them
+    full: F2  # (nb + 1, 6) with all rebound, see `rebound`
+    work: F2  # (nb, 4) of contacts of the island of which a body is the first
     shift: F2  # (nb + 1, 6) displacement over the step's length
     changed: I1  # (nb + 1,) the sweep that changed a body's velocity last by what counts
     part: F1  # (nb + 1,) of `before` in that, the rest being v's
@@ -158,6 +160,7 @@ class Points(NamedTuple):
     part: F1  # (m,) of the step before an impact with restitution
     closing: F1  # (m,) u_n before the step
     r: F2  # (m, 3)
+    full: F2  # (m, 3) with all rebound, see `rebound`
     old: F2  # (m, 3) r before the sweep at hand
     way: F2  # (m, 3) of the sweeps so far
     counts: F1  # (m,) 1 over what may be left of its velocity
@@ -265,6 +268,8 @@ def make(
         before=numbers(nb + 1, 6),
         free=numbers(nb + 1, 6),
         v=numbers(nb + 1, 6),
+        full=numbers(nb + 1, 6),
+        work=numbers(nb, 4),
         shift=numbers(nb + 1, 6),
         changed=whole(nb + 1),
         part=numbers(nb + 1),
@@ -306,6 +311,7 @@ def make(
         part=numbers(m),
         closing=numbers(m),
         r=numbers(m, 3),
+        full=numbers(m, 3),
         old=numbers(m, 3),
         way=numbers(m, 3),
         counts=numbers(m),

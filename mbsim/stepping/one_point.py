@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from mbsim.core.arrays import F1, F2, F4, V3
+from mbsim.core.arrays import F1, F2, F3, F4, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot
 from mbsim.stepping.arrays import (
@@ -127,15 +127,21 @@ def answer_of(p: Points, k: int, a: int, e: int) -> float:
 
 
 @jitable
+def fill_directions(p: Points, k: int, ground: int, H: F3) -> None:
+    """Fill H (2, 3, 6) of point k where it is not of ground: see `directions`."""
+    for side in range(2):
+        if p.body[k, side] != ground:
+            for a in range(3):
+                for c in range(6):
+                    H[side, a, c] = direction(p, k, side, a, c)
+
+
+@jitable
 def directions(p: Points, count: int, ground: int) -> F4:
     """Return H (count, 2, 3, 6): u along (n, x, z) by the velocities of I and J, 0 for ground."""
     H = np.zeros((count, 2, 3, 6))
     for k in range(count):
-        for side in range(2):
-            if p.body[k, side] != ground:
-                for a in range(3):
-                    for c in range(6):
-                        H[k, side, a, c] = direction(p, k, side, a, c)
+        fill_directions(p, k, ground, H[k])
     return H
 
 

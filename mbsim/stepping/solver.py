@@ -22,7 +22,7 @@ from mbsim.core.arrays import F2, I1
 from mbsim.core.jitable import jitable
 from mbsim.fclib.bodies.solve import solve_contacts
 from mbsim.stepping.arrays import ALONG, W_NN, W_XX, W_ZZ, Motion, Points
-from mbsim.stepping.one_point import apply, directions, solve_point, velocity_of
+from mbsim.stepping.one_point import apply, fill_directions, solve_point, velocity_of
 
 #: Sweeps before Newton's method, and behind it, at most.
 FEW_SWEEPS, MOST_SWEEPS = 40, 400
@@ -36,9 +36,12 @@ MOST_ROUNDS = 5
 WORST = 5.0
 #: A velocity that changes by less than this part of what may be left asks no other pair.
 STILL = 0.25
-#: Points up to which Newton's method finishes: of large piles a step's factors cost more than
-#: sweeps bring, and warm starts go on from step to step.
+#: Points that press up to which Newton's method finishes: of large piles a step's factors cost more
+#: than sweeps bring, and warm starts go on from step to step.
 NEWTON_POINTS = 300
+#: Of problems that may have no solution, as impacts may, sweeps end where so many more of them do
+#: not bring the square mean below this part of the least one before.
+WATCHED, BROUGHT = 64, 0.7
 #: Newton iterations of a step at most, and the smallest error that they go for.
 NEWTONS, SHARPEST = 40, 1e-13
 
@@ -178,6 +181,15 @@ def go_on(p: Points, M: Motion, count: int, part: float, number: int) -> None:
 
 
 @jitable
+def some_rebound(p: Points, count: int) -> bool:
+    """Return whether any point is to open by an impact."""
+    for k in range(count):
+        if p.ahead[k] < 0.0:
+            return True
+    return False
+
+
+@jitable
 def sweep_on(
     p: Points, M: Motion, count: int, allowed: tuple[float, float], most: int
 ) -> tuple[float, int, bool]:
@@ -187,7 +199,8 @@ def sweep_on(
     where one of all pairs changes less than 1 in the square mean over what presses, and nowhere
     more than `WORST`; or with `most`. Between them
     impulses go on along the way of the sweeps before, as conjugate gradients do, which is dropped
-    where a sweep changes more than the last one.
+    where a sweep changes more than the last one. Where there are impacts with restitution they end
+    too as they bring nothing any more: no impulses may give all of them their rebound.
     Source: M. Silcowitz, S. Niebe, K. Erleben, A nonsmooth nonlinear conjugate gradient method for
     interactive contact force problems, The Visual Computer 26 (2010) 893.
     """
@@ -196,15 +209,22 @@ def sweep_on(
         p.counts[k] = 1.0 / allowed[0]
         for a in range(3):
             p.old[k, a] = p.r[k, a]
+    doubtful = some_rebound(p, count)
+    least, aim = math.inf, math.inf
     change_all(p, M.changed, count, 0)
     while sweeps < most:
         sweeps += 1
         left, mean = sweep(p, M, count, sweeps)
+        least = min(least, mean)
         if sweeps % LOOKS == 1 and left > 1.0:
             let_jumps_count(p, M, count, allowed[0], allowed[1])
         solved = left <= 1.0 or (left <= WORST and mean <= 1.0)
         if (solved and whole) or sweeps == most or not math.isfinite(left):
             break
+        if doubtful and sweeps % WATCHED == 0:
+            if least > aim:
+                break
+            aim = BROUGHT * least
         whole = solved or sweeps == most - 1
         square = gradient(p, count)
         part = -1.0
@@ -220,33 +240,47 @@ def sweep_on(
 
 
 @jitable
-def finish(p: Points, M: Motion, ground: int, count: int, allowed: float) -> int:
+def list_closed(p: Points, M: Motion, count: int) -> I1:
+    """Return the points that press, and those that close as velocities are."""
+    closed, some = np.empty(count, dtype=np.int64), 0
+    for k in range(count):
+        if p.r[k, 0] != 0.0 or velocity_of(p, k, 0, M.v) + p.ahead[k] < 0.0:
+            closed[some] = k
+            some += 1
+    return closed[:some]
+
+
+@jitable
+def finish(p: Points, M: Motion, ground: int, closed: I1, allowed: float) -> int:
     """Let Newton's method go on from r, and fill v by what it finds; return its iterations.
 
-    It works on the same arrays (`fclib.bodies`), on the points that may press.
+    It works on the same arrays (`fclib.bodies`), on the points that are `closed`.
     """
+    count = len(closed)
     bodies, w = np.empty((count, 2), dtype=np.int64), np.empty((count, 3))
-    H = directions(p, count, ground)
+    H, mu, r = np.zeros((count, 2, 3, 6)), np.empty(count), np.empty((count, 3))
     size = 0.0
-    for k in range(count):
+    for row in range(count):
+        k = closed[row]
         i, j = p.body[k, 0], p.body[k, 1]
-        bodies[k, 0], bodies[k, 1] = (-1 if i == ground else i), (-1 if j == ground else j)
+        bodies[row, 0], bodies[row, 1] = (-1 if i == ground else i), (-1 if j == ground else j)
+        fill_directions(p, k, ground, H[row])
+        mu[row] = p.mu[k]
         for a in range(3):
-            w[k, a] = velocity_of(p, k, a, M.free)
-        w[k, 0] += p.ahead[k]
+            w[row, a], r[row, a] = velocity_of(p, k, a, M.free), p.r[k, a]
+        w[row, 0] += p.ahead[k]
         for a in range(3):
-            size += w[k, a] ** 2
+            size += w[row, a] ** 2
     tol = min(max(0.05 * allowed / max(math.sqrt(size), 1e-300), SHARPEST), 1e-3)
-    r = p.r[:count].copy()
-    found = solve_contacts(M.inverse, bodies, H, p.mu[:count], w, r, tol, 0, NEWTONS)
-    for k in range(count):
-        if not math.isfinite(r[k, 0] + r[k, 1] + r[k, 2]):
+    found = solve_contacts(M.inverse, bodies, H, mu, w, r, tol, 0, NEWTONS)
+    for row in range(count):
+        if not math.isfinite(r[row, 0] + r[row, 1] + r[row, 2]):
             return found[4]
-    for k in range(count):
-        d = (r[k, 0] - p.r[k, 0], r[k, 1] - p.r[k, 1], r[k, 2] - p.r[k, 2])
-        apply(p, k, M.v, d)
+    for row in range(count):
+        k = closed[row]
+        apply(p, k, M.v, (r[row, 0] - p.r[k, 0], r[row, 1] - p.r[k, 1], r[row, 2] - p.r[k, 2]))
         for a in range(3):
-            p.r[k, a] = r[k, a]
+            p.r[k, a] = r[row, a]
     return found[4]
 
 
@@ -284,8 +318,10 @@ def solve_points(
     newtons = 0
     if not math.isfinite(left):
         begin_anew(p, M, count)
-    elif count <= NEWTON_POINTS and not some_wide(p, count):
-        newtons = finish(p, M, ground, count, allowed[0])
+    elif not some_wide(p, count):
+        closed = list_closed(p, M, count)
+        if 0 < len(closed) <= NEWTON_POINTS:
+            newtons = finish(p, M, ground, closed, allowed[0])
     left, more, solved = sweep_on(p, M, count, allowed, MOST_SWEEPS)
     if not math.isfinite(left):
         begin_anew(p, M, count)

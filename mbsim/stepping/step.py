@@ -76,6 +76,7 @@ from mbsim.stepping.near_pairs import FARTHER, list_anew
 from mbsim.stepping.one_point import apply, velocity_of
 from mbsim.stepping.pairs import find_missed, find_points
 from mbsim.stepping.points import fill_point, fill_reach, way_at
+from mbsim.stepping.rebound import limit_rebound
 from mbsim.stepping.sleep import wake_loaded
 from mbsim.stepping.solver import project_positions, solve_points
 
@@ -308,6 +309,12 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
         noise = noise_of(S, h) * allowed / left_of(S, h)
         if not let_yield(S, count, noise) and not changed:
             break
+    more_left, more, newtons = limit_rebound(scene, S, count, h, (allowed, part))
+    if not math.isfinite(more_left):
+        return Code.NOT_FINITE
+    left = max(left, more_left)
+    sweeps += more
+    tally.count[NEWTONS] += newtons
     spread_parts(scene, S, count, h, slop)
     fill_shift(scene, S)
     most = max(DEEP * slop, h * S.plan.number[PUSH_SPEED])
