@@ -223,7 +223,7 @@ def test_parameters_of_one_law_are_as_each_alone(integrator):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["DOP853", "RADAU5"])
-def test_a_belt_through_five_sticks_and_five_slips(integrator):
+def test_a_belt_through_six_sticks_and_six_slips(integrator):
     name = "Force_Contact[301].mu_static"
     how = {"end_time": 48.5, "print_interval": 0.4}
     deck, signal = MODELS / "belt_stick_slip.xml", "bodies/2/position/x"
