@@ -39,9 +39,6 @@ STILL = 0.25
 #: Points that press up to which Newton's method finishes: of large piles a step's factors cost more
 #: than sweeps bring, and warm starts go on from step to step.
 NEWTON_POINTS = 300
-#: Of problems that may have no solution, as impacts may, sweeps end where so many more of them do
-#: not bring the square mean below this part of the least one before.
-WATCHED, BROUGHT = 64, 0.7
 #: Newton iterations of a step at most, and the smallest error that they go for.
 NEWTONS, SHARPEST = 40, 1e-13
 
@@ -181,15 +178,6 @@ def go_on(p: Points, M: Motion, count: int, part: float, number: int) -> None:
 
 
 @jitable
-def some_rebound(p: Points, count: int) -> bool:
-    """Return whether any point is to open by an impact."""
-    for k in range(count):
-        if p.ahead[k] < 0.0:
-            return True
-    return False
-
-
-@jitable
 def sweep_on(
     p: Points, M: Motion, count: int, allowed: tuple[float, float], most: int
 ) -> tuple[float, int, bool]:
@@ -199,8 +187,7 @@ def sweep_on(
     where one of all pairs changes less than 1 in the square mean over what presses, and nowhere
     more than `WORST`; or with `most`. Between them
     impulses go on along the way of the sweeps before, as conjugate gradients do, which is dropped
-    where a sweep changes more than the last one. Where there are impacts with restitution they end
-    too as they bring nothing any more: no impulses may give all of them their rebound.
+    where a sweep changes more than the last one.
     Source: M. Silcowitz, S. Niebe, K. Erleben, A nonsmooth nonlinear conjugate gradient method for
     interactive contact force problems, The Visual Computer 26 (2010) 893.
     """
@@ -209,22 +196,15 @@ def sweep_on(
         p.counts[k] = 1.0 / allowed[0]
         for a in range(3):
             p.old[k, a] = p.r[k, a]
-    doubtful = some_rebound(p, count)
-    least, aim = math.inf, math.inf
     change_all(p, M.changed, count, 0)
     while sweeps < most:
         sweeps += 1
         left, mean = sweep(p, M, count, sweeps)
-        least = min(least, mean)
         if sweeps % LOOKS == 1 and left > 1.0:
             let_jumps_count(p, M, count, allowed[0], allowed[1])
         solved = left <= 1.0 or (left <= WORST and mean <= 1.0)
         if (solved and whole) or sweeps == most or not math.isfinite(left):
             break
-        if doubtful and sweeps % WATCHED == 0:
-            if least > aim:
-                break
-            aim = BROUGHT * least
         whole = solved or sweeps == most - 1
         square = gradient(p, count)
         part = -1.0
