@@ -44,6 +44,7 @@ from mbsim.expressions.elementary import CODES, NUMBER, TIME
 from mbsim.expressions.functions import CONTACT_BY_INDEX, FUNCTIONS, SPLINE_POINTS, Kind
 from mbsim.expressions.parse import ExpressionError
 from mbsim.expressions.tree import Call, Expression, Node, Number, Time, UserResult
+from mbsim.forces.catalog import FORCES, Components
 from mbsim.model.elements import ArrayOfNumbers, Differential, InputElement, Spline, Variable
 from mbsim.model.names import element_name
 
@@ -185,11 +186,10 @@ class ProgramTable:
         contacts: Sequence[int] = (),
     ) -> Programs:
         """Return the programs; force measures find their rows by (statement, id) in these lists."""
-        # those of vector forces take forces on one body too
         rows = {
-            ("VECTORFORCE", id): (1, k)
+            (form.known_as, id): (1, k)
             for k, (kind, id) in enumerate(applied)
-            if kind == "BODYFORCE"
+            if isinstance(form := FORCES[kind].form, Components) and form.known_as
         }
         rows.update({element: (1, k) for k, element in enumerate(applied)})
         rows.update({element: (0, k) for k, element in enumerate(connections)})

@@ -207,6 +207,7 @@ class Components(Form):
     """Force and torque by six expressions, the element's `exprs`."""
 
     alone: bool  # whether nothing acts on a second body
+    known_as: str = ""  # the kind whose functions ask for it too
 
 
 @dataclass(frozen=True)

@@ -172,6 +172,7 @@ def test_what_changes_nothing_is_not_refused(begun, tmp_path):
 ASIDE = {
     *(("Model", name) for name in ("name", "file", "sha256", "notes", "warnings", "overrides")),
     *(("Subroutine", "dll_name"), ("Subroutine", "script_name"), ("Graphic", "mesh_file")),
+    *(("RelationSubroutine", name) for name in ("dll_name", "script_name")),
     # how pictures show it
     *(("Graphic", "color"), ("Graphic", "hidden"), ("Graphic", "bounds")),
     *(("Change", "text"), ("Settings", "notes"), ("Stage", "tol_from")),

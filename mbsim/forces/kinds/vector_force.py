@@ -98,7 +98,7 @@ force(
     "BODYFORCE",
     "Force_Vector_OneBody",
     "body_forces",
-    form=Components(alone=True),
+    form=Components(alone=True, known_as="VECTORFORCE"),
     title="body force",
     table="body_forces",
     reading=Reading((_I._replace(alias="marker_id"), *_ATTRIBUTES), _read),
