@@ -304,13 +304,14 @@ class Tree(NamedTuple):
 class Equations(NamedTuple):
     """Constraint equations that the tree does not hold by itself: loops, motions, couplers.
 
-    An equation is a sum of terms, less a function of TIME, = 0; see constraints.equations.
+    An equation is a sum of terms, less a function, = 0; see constraints.equations.
     """
 
     first: I1  # (ne + 1,) first term of each
-    program: I1  # (ne,) function of TIME, or the whole of a general constraint; -1 for none
+    program: I1  # (ne,) function of TIME or the state, or a whole general constraint; -1 for none
     level: I1  # (ne,) 2 holds displacements, 1 velocities, 0 accelerations
-    general: I1  # (ne,) 1 where the program is the whole equation
+    general: I1  # (ne,) 1 where the program is the whole equation, 2 where a motion's displacement
+    # depends on the state; terms of the program stand behind the motion's own
     user: I1  # (ne,) 1 + row of `Users` whose relation of the terms it is, 0 for their sum
     constant: F1  # (ne,)
     start: F2  # (ne, 2) sum and its rate that assembly brings about where no level does; or NaN

@@ -25,10 +25,17 @@ from mbsim.compile_model.contacts import ContactTables, contact_tables, kinds_ta
 from mbsim.compile_model.gravity import Pull
 from mbsim.compile_model.groups import Groups, find_groups, natural_speed
 from mbsim.compile_model.markers import MarkerTable, body_rows
-from mbsim.compile_model.mechanism import sweep
 from mbsim.compile_model.pairing import Plans, plan_pairs
 from mbsim.compile_model.rigid_slots import rigid_slots
-from mbsim.compile_model.scratch import Sizes, awake, empty_log, empty_rows, scratch, start_state
+from mbsim.compile_model.scratch import (
+    Sizes,
+    awake,
+    empty_log,
+    empty_rows,
+    scratch,
+    start_state,
+    sweep,
+)
 from mbsim.compile_model.switching import has_modes, sticking
 from mbsim.compile_model.user_code import UserCode, load_user_code, no_residuals, users_table
 from mbsim.core.collection import no_collection

@@ -16,7 +16,6 @@ import numpy as np
 
 from mbsim.arrays import codes
 from mbsim.arrays.model import Connections, Curves, Equations, Surfaces, Tree
-from mbsim.arrays.scratch import Sweep
 from mbsim.compile_model.equation_sums import Sums
 from mbsim.compile_model.higher_pairs import add_higher_pairs
 from mbsim.compile_model.markers import MarkerTable
@@ -219,7 +218,11 @@ class _Builder:
         return self.markers.row(joint.i_marker_id), self.markers.row(joint.j_marker_id)
 
     def add_motion(self, motion: Motion) -> None:
-        """Add a motion: one row less a function of TIME."""
+        """Add a motion: one row less a function of TIME, and of the state.
+
+        Of a displacement that depends on the state the gradient acts too. A force along a velocity
+        or an acceleration is along the motion alone: there bodies are only named.
+        """
         if motion.joint_id is not None:
             i, j = self.joint_markers(motion.joint_id)
         else:
@@ -233,13 +236,19 @@ class _Builder:
         assert motion.expr is not None
         given = self.programs.input_row("motions", motion.id)
         if given is None:
-            program = self.programs.add(motion.expr, motion, of_time=True, differentiable=True)
+            program = self.programs.add(
+                motion.expr, motion, differentiable=True, velocities=motion.val_type == "A"
+            )
         else:
             program = self.programs.add_input(given)
         level = _LEVELS[motion.val_type]
+        seen, _ = self.bodies_seen(program)
+        for body_row in seen:
+            self.sums.terms.append((codes.GENERAL, body_row, 0, 0, 0, -float(level == 2), -1))
+        general = 2 if seen and level == 2 else 0
         start = (motion.ic_disp, motion.ic_vel)
         self.sums.close(
-            connection, "its motion", 0.0, self.unit([row]), program, level, start=start
+            connection, "its motion", 0.0, self.unit([row]), program, level, general, start
         )
 
     def add_coupler(self, coupler: Coupler) -> None:
@@ -258,19 +267,24 @@ class _Builder:
         else:
             self.sums.close(connection, "its ratio", total, self.unit(rows))
 
-    def add_general(self, constraint: GeneralConstraint) -> None:
-        """Add an expression that is 0: one term for each body that it looks at."""
-        program = self.programs.add(constraint.expr, constraint, differentiable=True)
+    def bodies_seen(self, program: int) -> tuple[list[int], int]:
+        """Return a marker row for each moving body that a program looks at, and ground's or 0."""
         rows = self.programs.looks_at(program)
         bodies = {self.markers.frames[row][0]: row for row in rows}
         fixed = bodies.pop(self.markers.ground, 0)
-        if not bodies:
+        return list(bodies.values()), fixed
+
+    def add_general(self, constraint: GeneralConstraint) -> None:
+        """Add an expression that is 0: one term for each body that it looks at."""
+        program = self.programs.add(constraint.expr, constraint, differentiable=True)
+        seen, fixed = self.bodies_seen(program)
+        if not seen:
             name = element_name(self.model.file, "Constraint_General", constraint.id)
             message = f"expr={constraint.expr.text!r}: must depend on where a moving body is"
             raise DeckError([Fault(constraint.source.file, constraint.source.line, name, message)])
-        i, j = ([*bodies.values(), fixed, 0])[:2]
+        i, j = ([*seen, fixed, 0])[:2]
         connection = self.connect("GCON", constraint.id, i, j)
-        for row in bodies.values():
+        for row in seen:
             self.sums.terms.append((codes.GENERAL, row, 0, 0, 0, 1.0, -1))
         self.sums.close(connection, "its expression", 0.0, self.length, program, general=1)
 
@@ -447,47 +461,4 @@ def constrain(
         builder.elements,
         builder.sums.names,
         *pairs_of,
-    )
-
-
-def sweep(mechanism: Mechanism) -> Sweep:
-    """Return scratch for the recursion and the equations."""
-    eq = mechanism.equations
-    nt, ne, nh = len(mechanism.tree.body), len(eq.program), int((eq.slot >= 0).sum())
-    return Sweep(
-        H=np.zeros((nt, 6, 6)),
-        S=np.zeros((nt, 6, 6)),
-        W=np.zeros((nt, 6, 6)),
-        L=np.zeros((nt, 6, 6)),
-        c=np.zeros((nt, 6)),
-        p=np.zeros((nt, 6)),
-        z=np.zeros((nt, 6)),
-        a=np.zeros((nt, 6)),
-        arm=np.zeros((nt, 3)),
-        bias=np.zeros((nt, 6)),
-        answer=np.zeros((nt, 6)),
-        mark=np.zeros(nt, dtype=np.int64),
-        chosen=np.zeros(ne + 1, dtype=np.int64),
-        G=np.zeros((len(eq.kind), 12)),
-        rate=np.zeros((ne, 4)),
-        A=np.zeros((ne, ne)),
-        multiplier=np.zeros(ne),
-        rhs=np.zeros(ne),
-        skyline=np.zeros(ne, dtype=np.int64),
-        size=np.ones(ne),
-        released=np.zeros(ne, dtype=np.int64),
-        wanted=np.zeros(ne),
-        kept_at=np.zeros(8),
-        kept_power=np.zeros(8),
-        kept_a=np.zeros((8, nt if ne else 0, 6)),
-        quality=np.zeros(18),
-        stress=np.zeros((ne, 6 * len(mechanism.elements))),
-        jet=np.zeros(12),
-        pair=np.zeros(3),
-        related=np.zeros((int(np.diff(eq.first)[eq.user > 0].max(initial=0)), 3)),
-        located=np.zeros(len(mechanism.along)),
-        share=np.zeros((nh, nh)),
-        mix=np.zeros((nh, nh)),
-        cone=np.zeros((codes.CONE_ROWS, nh)),
-        kept_p=np.zeros((nt if nh else 0, 6)),
     )

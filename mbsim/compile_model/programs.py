@@ -64,6 +64,13 @@ _STATEMENTS = {
 }
 
 
+#: How many rows of markers an instruction that measures between them begins with.
+_MEASURED = {
+    **dict.fromkeys((DISTANCE, TURN, ORIENT, CLOSING, TURNING), 2),
+    **dict.fromkeys((OFFSET, INCLUDED, SPEED, SPIN), 3),
+    VELOCITY: 4,
+}
+
 Rows = Mapping[tuple[str, int], tuple[int, int]]
 
 
@@ -93,6 +100,7 @@ class ProgramTable:
         owner: Any = None,
         *,
         differentiable: bool = False,
+        velocities: bool = False,
         of_time: bool = False,
         forces: bool = False,
         accelerations: bool = False,
@@ -106,6 +114,8 @@ class ProgramTable:
             Whose expression it is: a fault then names its line.
         differentiable : bool
             Only displacements and TIME, so that jets mean something.
+        velocities : bool
+            Velocities too, where it is differentiable: of these the jets are values alone.
         of_time : bool
             Only TIME.
         forces : bool
@@ -121,6 +131,8 @@ class ProgramTable:
         allowed = {Kind.ELEMENTARY, Kind.VARIABLE, Kind.TABLE}
         if not of_time:
             allowed.add(Kind.DISPLACEMENT)
+            if velocities:
+                allowed.add(Kind.VELOCITY)
             if not differentiable:
                 allowed |= {Kind.VELOCITY, Kind.STATE}
                 if forces:
@@ -167,14 +179,12 @@ class ProgramTable:
         return (*self.element_rows[instruction.element], *instruction.rows)
 
     def looks_at(self, program: int) -> list[int]:
-        """Return the rows of the markers that displacements of a program are measured between."""
+        """Return the rows of the markers that a program measures between."""
         angles = list(self.markers.angle_rows)
         found: dict[int, None] = {}
         for op, rows, _, _ in self.programs[program]:
-            if op in (DISTANCE, TURN, ORIENT):
-                found.update(dict.fromkeys(rows[:2]))
-            elif op == OFFSET or op == INCLUDED:
-                found.update(dict.fromkeys(rows[:3]))
+            if op in _MEASURED:
+                found.update(dict.fromkeys(rows[: _MEASURED[op]]))
             elif op == ANGLE:
                 found.update(dict.fromkeys(angles[rows[0]]))
         return list(found)
@@ -330,7 +340,7 @@ class _Compiler:
         if isinstance(node, Time):
             return [Instruction(TIME)]
         if isinstance(node, UserResult):
-            if Kind.VELOCITY not in self.allowed and node.statement != "MOTION":
+            if Kind.STATE not in self.allowed and node.statement != "MOTION":
                 raise ExpressionError("what a user subroutine returns cannot be used here", 1)
             row = self.table.users[node.statement, node.id]
             # one of several results that are asked for apart, as outputs in forces: it is called

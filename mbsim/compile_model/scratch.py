@@ -9,8 +9,9 @@ import numpy as np
 
 from mbsim.arrays import codes
 from mbsim.arrays.model import Graphics, Residuals
-from mbsim.arrays.scratch import Rows, Work
+from mbsim.arrays.scratch import Rows, Sweep, Work
 from mbsim.arrays.state import Awake, Log, State
+from mbsim.compile_model.mechanism import Mechanism
 from mbsim.core.problem import WHOLE
 from mbsim.geometry.catalog import POINT
 from mbsim.geometry.motion import MOTION
@@ -218,4 +219,47 @@ def empty_rows(n: Sizes) -> Rows:
         points=np.zeros((0, codes.POINT_COLUMNS)),
         events=np.zeros((events, 4)),
         used=np.zeros(3, dtype=np.int64),
+    )
+
+
+def sweep(mechanism: Mechanism) -> Sweep:
+    """Return scratch for the recursion and the equations."""
+    eq = mechanism.equations
+    nt, ne, nh = len(mechanism.tree.body), len(eq.program), int((eq.slot >= 0).sum())
+    return Sweep(
+        H=np.zeros((nt, 6, 6)),
+        S=np.zeros((nt, 6, 6)),
+        W=np.zeros((nt, 6, 6)),
+        L=np.zeros((nt, 6, 6)),
+        c=np.zeros((nt, 6)),
+        p=np.zeros((nt, 6)),
+        z=np.zeros((nt, 6)),
+        a=np.zeros((nt, 6)),
+        arm=np.zeros((nt, 3)),
+        bias=np.zeros((nt, 6)),
+        answer=np.zeros((nt, 6)),
+        mark=np.zeros(nt, dtype=np.int64),
+        chosen=np.zeros(ne + 1, dtype=np.int64),
+        G=np.zeros((len(eq.kind), 12)),
+        rate=np.zeros((ne, 4)),
+        A=np.zeros((ne, ne)),
+        multiplier=np.zeros(ne),
+        rhs=np.zeros(ne),
+        skyline=np.zeros(ne, dtype=np.int64),
+        size=np.ones(ne),
+        released=np.zeros(ne, dtype=np.int64),
+        wanted=np.zeros(ne),
+        kept_at=np.zeros(8),
+        kept_power=np.zeros(8),
+        kept_a=np.zeros((8, nt if ne else 0, 6)),
+        quality=np.zeros(18),
+        stress=np.zeros((ne, 6 * len(mechanism.elements))),
+        jet=np.zeros(12),
+        pair=np.zeros(3),
+        related=np.zeros((int(np.diff(eq.first)[eq.user > 0].max(initial=0)), 3)),
+        located=np.zeros(len(mechanism.along)),
+        share=np.zeros((nh, nh)),
+        mix=np.zeros((nh, nh)),
+        cone=np.zeros((codes.CONE_ROWS, nh)),
+        kept_p=np.zeros((nt if nh else 0, 6)),
     )

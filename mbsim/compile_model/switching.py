@@ -33,6 +33,7 @@ from mbsim.expressions.tree import Call, Expression, Node, Number
 from mbsim.forces.catalog import FORCES, Components, Expressed, Switched, memories, of_form
 from mbsim.laws.catalog import FRICTION_LAWS
 from mbsim.model.elements import Model
+from mbsim.model.mechanism_checks import looked_at
 
 #: Switches of one expression that are watched at most: so many bits a number has.
 MOST_SWITCHES = 48
@@ -130,7 +131,7 @@ def _sides(found: Iterable[Node]) -> Node:
 
 
 def _acting(model: Model) -> Iterator[Expression]:
-    """Yield the expressions of forces and of slopes of states."""
+    """Yield the expressions of forces, slopes of states, and accelerations that depend on these."""
     for kind in of_form(Expressed):
         yield from (force.expr for force in model.table(kind.name).values())
     for kind in of_form(Components):
@@ -138,6 +139,10 @@ def _acting(model: Model) -> Iterator[Expression]:
             yield from (expression for expression in element.exprs if expression is not None)
     for state in model.differentials.values():
         yield state.expr
+    for motion in model.motions.values():
+        of_state = motion.expr is not None and any(looked_at(model, motion.expr))
+        if motion.expr is not None and motion.val_type == "A" and of_state:
+            yield motion.expr
 
 
 def has_modes(model: Model) -> bool:

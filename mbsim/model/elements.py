@@ -280,7 +280,7 @@ class Motion:
     j_marker_id: int = 0
     direction: str = "R"
     val_type: str = "D"  # D, V or A
-    expr: Expression | None = None  # of TIME; [L], [rad] or their rates
+    expr: Expression | None = None  # [L], [rad] or their rates
     ic_disp: float | None = None  # what a V or A motion starts from; None: as the bodies stand
     ic_vel: float | None = None
     user: Subroutine | None = None  # `expr` is then what it returns

@@ -11,7 +11,7 @@ from mbsim.expressions.functions import FUNCTIONS, SPLINE_POINTS, Kind
 from mbsim.expressions.tree import Call, Number
 from mbsim.forces.catalog import COMPONENTS, FORCES, Components, of_form
 from mbsim.joints.catalog import JOINTS
-from mbsim.model.elements import Model, Source
+from mbsim.model.elements import Model, Motion, Source
 
 #: What has an id, as functions and requests of elements call it, with its statement.
 STATEMENTS = {
@@ -223,7 +223,7 @@ def _allowed(type: str, what: str) -> str:
 
 
 def _motions(model: Model, exists: Exists) -> Iterator[Fault]:
-    """Yield motions that their joint does not allow, that are repeated, or use more than TIME."""
+    """Yield motions that their joint does not allow, that are repeated, or use what they may not."""
     first: dict[tuple[Any, ...], int] = {}
     for motion in model.motions.values():
         if exists("Motion_Joint", motion.id):
@@ -242,9 +242,44 @@ def _motions(model: Model, exists: Exists) -> Iterator[Fault]:
                 message += f"joint {motion.joint_id}" if joint else "markers"
                 yield _fault(motion.source, name, f"{message}; must be given once")
             first.setdefault(of, motion.id)
-        if motion.expr is not None and (other := _not_of_time(motion.expr)):
-            message = f'expr="{_short(motion.expr.text)}": uses {other}; in this release a motion '
-            yield _fault(motion.source, name, message + "must be an expression of TIME alone")
+        if motion.expr is not None and (message := _not_of_motion(model, motion)):
+            yield _fault(motion.source, name, f'expr="{_short(motion.expr.text)}": {message}')
+
+
+def _not_of_motion(model: Model, motion: Motion) -> str:
+    """Return what of an expression cannot be given to a motion, and what can; or nothing."""
+    assert motion.expr is not None
+    allowed, what = {*_OF_POSES}, "of TIME and displacements"
+    if motion.val_type == "A":
+        allowed.add(Kind.VELOCITY)
+        what = "of TIME, displacements and velocities"
+    for call, through in looked_at(model, motion.expr):
+        kind = FUNCTIONS[call.name].kind
+        if kind not in allowed:
+            given = {"D": "displacement", "V": "velocity", "A": "acceleration"}[motion.val_type]
+            where = f" in {through}" if through else ""
+            return (
+                f"uses {call.name}{where}, which looks at {kind.value}; a motion that gives "
+                f"the {given} must be an expression {what}"
+            )
+    return ""
+
+
+def looked_at(model: Model, expression: Expression) -> Iterator[tuple[Call, str]]:
+    """Yield what an expression looks at beyond TIME, by variables too, and by which of these."""
+    waiting, seen = [(expression, "")], set[tuple[str, int]]()
+    while waiting:
+        now, through = waiting.pop()
+        for call in _calls(now):
+            if call.name in FUNCTIONS and FUNCTIONS[call.name].kind not in _OF_TIME:
+                yield call, through
+        for key in _put_in(now):
+            table: Mapping[int, Any] = (
+                model.variables if key[0] == "VARVAL" else model.differentials
+            )
+            if key not in seen and key[1] in table:
+                seen.add(key)
+                waiting.append((table[key[1]].expr, f"{key[0]}({key[1]})"))
 
 
 def _weights(model: Model) -> Iterator[Fault]:
@@ -337,6 +372,9 @@ def _put_in(expression: Expression) -> Iterator[tuple[str, int]]:
             yield call.name, int(call.args[0].value)
 
 
+#: What functions look at that depends on no state, and on where bodies are at most.
+_OF_TIME = (Kind.ELEMENTARY, Kind.TABLE, Kind.VARIABLE)
+_OF_POSES = (*_OF_TIME, Kind.DISPLACEMENT)
 _PUT_IN = {"VARVAL": "Reference_Variable", "DIF1": "Control_Diff"}
 
 

@@ -114,7 +114,7 @@ def _culprit(system: System, y: Any, t: float) -> str:
     from mbsim.dynamics.initial.assembly import equation_name
 
     scene, found = system.scene, []
-    for e in np.flatnonzero((scene.equations.program >= 0) & (scene.equations.general == 0)):
+    for e in np.flatnonzero((scene.equations.program >= 0) & (scene.equations.general != 1)):
         level = int(scene.equations.level[e])
         try:
             jets = jet(scene, t, y, int(scene.equations.program[e]))[: 1 + level]

@@ -43,9 +43,10 @@ def _seen_through(model: Model, expression: Expression) -> Iterator[int]:
 def _holding(model: Model) -> dict[int, str]:
     """Return the variables on which positions depend that constraints hold, and which do."""
     found: dict[int, str] = {}
-    # motions are of TIME alone
-    for element in model.general_constraints.values():
-        name = element_name(model.file, "Constraint_General", element.id)
+    displaced = [motion for motion in model.motions.values() if motion.val_type == "D"]
+    for element in (*displaced, *model.general_constraints.values()):
+        statement = getattr(element, "statement", "Constraint_General")
+        name = element_name(model.file, statement, element.id)
         for id in _seen_through(model, element.expr):
             found.setdefault(id, name)
     return found

@@ -1,7 +1,7 @@
 """Constraint equations that the tree does not hold: their rows, and the multipliers they need.
 
-An equation g(q, t) = 0 is a sum of terms less a function of TIME, or a user's relation of terms.
-For each its residual, the
+An equation g(q, t) = 0 is a sum of terms less a function of TIME or of the state, an expression, or
+a user's relation of terms. For each its residual, the
 rate G V - dg/dt and what of the second rate follows from velocities alone are taken; a term's
 gradient is a wrench on the bodies of its markers. The tree answers a unit multiplier of equation
 r with accelerations T G_r', and A = G T G' says how equations act on each other, so
@@ -101,12 +101,12 @@ def plain_term(scene: Scene, y: F1, k: int, anew: int) -> V3:
 def fill_terms(scene: Scene, t: float, y: F1, e: int, anew: int) -> None:
     """Do the same; with `anew` 0 a higher pair touches where its equation before this found."""
     eq, sweep = scene.equations, scene.sweep
-    value, flow, second = -eq.constant[e], 0.0, 0.0
+    value, flow, second, moved = -eq.constant[e], 0.0, 0.0, 0.0
     for k in range(eq.first[e], eq.first[e + 1]):
         i, j, factor, G = eq.i[k], eq.j[k], eq.factor[k], sweep.G[k]
         kind = eq.kind[k]
         if kind == GENERAL:
-            general_term(scene, t, y, i, eq.program[e], G)
+            moved += general_term(scene, t, y, i, eq.program[e], factor, G)
             continue
         if kind == TOUCHING:
             flow, second = touching_term(scene, y, i, j, eq.axis[k, AXIS_I], eq.axis[k, AXIS_J], G)
@@ -129,7 +129,7 @@ def fill_terms(scene: Scene, t: float, y: F1, e: int, anew: int) -> None:
     if eq.program[e] >= 0:
         f, df, ddf = jet(scene, t, y, eq.program[e])
         if eq.general[e] == 1:
-            value, rate, second = value + f, rate + df, second + ddf
+            value, rate, second = value + f, df, second + ddf
         elif eq.level[e] == 2:
             value, rate, second = value - f, rate - df, second - ddf
         elif eq.level[e] == 1:
@@ -139,7 +139,7 @@ def fill_terms(scene: Scene, t: float, y: F1, e: int, anew: int) -> None:
     sweep.rate[e, RESIDUAL] = value
     sweep.rate[e, MISMATCH] = rate
     sweep.rate[e, GAMMA] = second
-    sweep.rate[e, FLOW] = flow
+    sweep.rate[e, FLOW] = flow + moved
 
 
 def lasting(scene: Scene) -> np.ndarray:

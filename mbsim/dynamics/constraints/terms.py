@@ -181,12 +181,21 @@ def touching_term(scene: Scene, y: F1, i: int, j: int, axis: int, s: int, G: F1)
 
 
 @jitable
-def general_term(scene: Scene, t: float, y: F1, i: int, program: int, G: F1) -> None:
-    """Fill the gradient of a program with respect to the body of marker i."""
+def general_term(
+    scene: Scene, t: float, y: F1, i: int, program: int, factor: float, G: F1
+) -> float:
+    """Fill `factor` times the gradient of a program with respect to the body of marker i.
+
+    Returns it times the velocity of that body. A factor of 0 only names the body: what the program
+    gives depends on it, and no force acts along that.
+    """
+    for k in range(12):
+        G[k] = 0.0
+    if factor == 0.0:
+        return 0.0
     b = scene.markers.body[i]
     out = scene.sweep.jet
     gradient(scene, t, y, program, b, out)
-    force, torque = (out[0], out[1], out[2]), (out[3], out[4], out[5])
+    force, torque = scale(factor, vector(out)), scale(factor, vector(out[3:]))
     add_side(scene, y, G[0:6], i, position(scene, y, b), force, torque)
-    for k in range(6, 12):
-        G[k] = 0.0
+    return dot(force, vector(scene.work.v[b])) + dot(torque, vector(scene.work.w[b]))

@@ -119,8 +119,7 @@ def _count_turns(scene: Scene, y: Array, serve: Serve) -> None:
     serve(Joints.MATRIX, y)
     for e in range(len(equations.program)):
         k = int(equations.first[e])
-        is_motion = equations.program[e] >= 0 and equations.first[e + 1] == k + 1
-        if not is_motion or equations.off[e] == 1 or equations.kind[k] != ANGLE:
+        if equations.program[e] < 0 or equations.off[e] == 1 or equations.kind[k] != ANGLE:
             continue
         given = 0.0 if equations.level[e] == 2 else float(equations.start[e, START_SUM])
         turns = (float(scene.sweep.rate[e, _RESIDUAL]) - given) / (2.0 * np.pi)

@@ -2,6 +2,7 @@
 
 Rows of the border for motions that hold no displacements, by differences, as about O: of C v with
 poses, of C a + s(q, v) with poses and velocities; a, the accelerations, as they are in body axes.
+What a motion is to be counts too, where it depends on the state.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import cross, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_body, position
-from mbsim.dynamics.constraints.equations import FLOW, GAMMA, fill_equation, tree_index
+from mbsim.dynamics.constraints.equations import GAMMA, MISMATCH, fill_equation, tree_index
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.tree import origin
 from mbsim.dynamics.expressions.slopes import DIRECTIONS, POSES
@@ -51,10 +52,10 @@ def acceleration_along(scene: Scene, L: Linear, y: F1, e: int) -> float:
 
 @jitable
 def held_value(scene: Scene, L: Linear, t: float, y: F1, e: int) -> float:
-    """Return the velocity or acceleration that equation e holds."""
+    """Return the velocity or acceleration that equation e holds, less what it is to be."""
     fill_equation(scene, t, y, e)
     if scene.equations.level[e] == 1:
-        return scene.sweep.rate[e, FLOW]
+        return scene.sweep.rate[e, MISMATCH]
     return scene.sweep.rate[e, GAMMA] + acceleration_along(scene, L, y, e)
 
 
