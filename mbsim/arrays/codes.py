@@ -96,6 +96,9 @@ C1, C2, C3, FORM = range(4)
 # what of a joint's rotation is free: `Tree.turn`
 TURN_LOCKED, TURN_AXIS, TURN_CROSS, TURN_FREE, TURN_ROOT = range(5)
 
+# what the program of an equation is, beside a function of TIME alone: `Equations.general`
+WHOLE, OF_STATE = 1, 2
+
 # kinds of terms: `Equations.kind`
 OFFSET, PERP, ANGLE, DISTANCE, GENERAL, TOUCHING, TWIST, HIGHER_PAIR = range(8)
 

@@ -310,7 +310,7 @@ class Equations(NamedTuple):
     first: I1  # (ne + 1,) first term of each
     program: I1  # (ne,) function of TIME or the state, or a whole general constraint; -1 for none
     level: I1  # (ne,) 2 holds displacements, 1 velocities, 0 accelerations
-    general: I1  # (ne,) 1 where the program is the whole equation, 2 where a motion's displacement
+    general: I1  # (ne,) WHOLE where the program is the whole equation, OF_STATE where a motion
     # depends on the state; terms of the program stand behind the motion's own
     user: I1  # (ne,) 1 + row of `Users` whose relation of the terms it is, 0 for their sum
     constant: F1  # (ne,)

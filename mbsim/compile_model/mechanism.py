@@ -245,7 +245,7 @@ class _Builder:
         seen, _ = self.bodies_seen(program)
         for body_row in seen:
             self.sums.terms.append((codes.GENERAL, body_row, 0, 0, 0, -float(level == 2), -1))
-        general = 2 if seen and level == 2 else 0
+        general = codes.OF_STATE if seen else 0
         start = (motion.ic_disp, motion.ic_vel)
         self.sums.close(
             connection, "its motion", 0.0, self.unit([row]), program, level, general, start
@@ -286,7 +286,9 @@ class _Builder:
         connection = self.connect("GCON", constraint.id, i, j)
         for row in seen:
             self.sums.terms.append((codes.GENERAL, row, 0, 0, 0, 1.0, -1))
-        self.sums.close(connection, "its expression", 0.0, self.length, program, general=1)
+        self.sums.close(
+            connection, "its expression", 0.0, self.length, program, general=codes.WHOLE
+        )
 
     def add_rigid_force(self, kind: ForceKind, force: MarkerForce) -> None:
         """Add the velocity that a rigid force holds while it sticks; it is no connection."""

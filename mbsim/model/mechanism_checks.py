@@ -223,7 +223,7 @@ def _allowed(type: str, what: str) -> str:
 
 
 def _motions(model: Model, exists: Exists) -> Iterator[Fault]:
-    """Yield motions that their joint does not allow, that are repeated, or use what they may not."""
+    """Yield motions that their joint does not allow, that are repeated, or look at too much."""
     first: dict[tuple[Any, ...], int] = {}
     for motion in model.motions.values():
         if exists("Motion_Joint", motion.id):

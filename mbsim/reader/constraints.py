@@ -305,7 +305,7 @@ CONSTRAINT_GENERAL = Statement(
 _GIVEN_MOTION: dict[str, Spec] = {
     "val_type": Spec(keyword(VALUE_TYPES), "what expr gives, see below", required=True),
     "type": GIVEN_BY,
-    "expr": Spec(EXPRESSION, "displacement, velocity or acceleration over TIME"),
+    "expr": Spec(EXPRESSION, "displacement, velocity or acceleration"),
     "ic_disp": Spec(REAL, "displacement at the start, with V and A", "L or rad", "as assembled"),
     "ic_vel": Spec(REAL, "velocity at the start, with A", "L/T or rad/T", "as bodies move"),
     **USERSUB,
@@ -320,7 +320,7 @@ MOTION_JOINT = Statement(
         **_GIVEN_MOTION,
     },
     _build_motion,
-    about="drives a joint by an expression of TIME",
+    about="drives a joint by an expression",
 )
 MOTION_MARKER = Statement(
     "Motion_Marker",
@@ -333,5 +333,5 @@ MOTION_MARKER = Statement(
         **_GIVEN_MOTION,
     },
     _build_motion,
-    about="drives one direction between two markers by an expression of TIME",
+    about="drives one direction between two markers by an expression",
 )

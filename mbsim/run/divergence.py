@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED, WHOLE
 from mbsim.errors import SolverError
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ def _culprit(system: System, y: Any, t: float) -> str:
     from mbsim.dynamics.initial.assembly import equation_name
 
     scene, found = system.scene, []
-    for e in np.flatnonzero((scene.equations.program >= 0) & (scene.equations.general != 1)):
+    for e in np.flatnonzero((scene.equations.program >= 0) & (scene.equations.general != WHOLE)):
         level = int(scene.equations.level[e])
         try:
             jets = jet(scene, t, y, int(scene.equations.program[e]))[: 1 + level]

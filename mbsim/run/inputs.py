@@ -43,11 +43,16 @@ def _seen_through(model: Model, expression: Expression) -> Iterator[int]:
 def _holding(model: Model) -> dict[int, str]:
     """Return the variables on which positions depend that constraints hold, and which do."""
     found: dict[int, str] = {}
-    displaced = [motion for motion in model.motions.values() if motion.val_type == "D"]
-    for element in (*displaced, *model.general_constraints.values()):
-        statement = getattr(element, "statement", "Constraint_General")
-        name = element_name(model.file, statement, element.id)
-        for id in _seen_through(model, element.expr):
+    holding = [
+        (motion.statement, motion.id, motion.expr)
+        for motion in model.motions.values()
+        if motion.val_type == "D" and motion.expr is not None
+    ]
+    general = model.general_constraints.values()
+    holding += [("Constraint_General", each.id, each.expr) for each in general]
+    for statement, number, expression in holding:
+        name = element_name(model.file, statement, number)
+        for id in _seen_through(model, expression):
             found.setdefault(id, name)
     return found
 

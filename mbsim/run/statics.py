@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbsim.arrays.codes import CODE_OPERAND, CODE_OPERATION, JET_VALUE
+from mbsim.arrays.codes import CODE_OPERAND, CODE_OPERATION, JET_VALUE, WHOLE
 from mbsim.compile_model.force_elements import STATEMENT
 from mbsim.compile_model.instructions import USER
 from mbsim.core import tags
@@ -37,7 +37,7 @@ def standing_still(system: System, t: float) -> Iterator[None]:
     """
     programs, equations = system.scene.programs, system.scene.equations
     given, constants = equations.program.copy(), equations.constant.copy()
-    rates = (given >= 0) & (equations.level < 2) & (equations.general == 0)
+    rates = (given >= 0) & (equations.level < 2) & (equations.general != WHOLE)
     times = programs.code[:, CODE_OPERATION] == TIME
     kept = programs.code.copy()
     if times.any():

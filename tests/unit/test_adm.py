@@ -339,8 +339,8 @@ FAULTS = {
     "expression": ("GCON/1, FUNCTION=DX(102,", ("GCON[1]", "is no expression", "column")),
     "unknown in gcon": ("GCON/1, FUNCTION=DM(102,77)", ("GCON[1]", "77", "no MARKER has this id")),
     "state in motion": (
-        "MOTION/1, JOINT=1, FUNCTION=DZ(102,202)",
-        ("MOTION[1]", "uses DZ", "TIME alone"),
+        "MOTION/1, JOINT=1, FUNCTION=VZ(102,202)",
+        ("MOTION[1]", "uses VZ", "TIME and displacements"),
     ),
     "wrong direction": (
         "MOTION/1, JOINT=1, TRANSLATION, FUNCTION=TIME",

@@ -204,8 +204,8 @@ BAD = {
         ("Motion_Joint[2]", "motion 1 gives the same direction of the same joint 1"),
     ),
     "of the state": (
-        f'{MOTION} val_type="D" expr="DX(20)"/>',
-        ("Motion_Joint[1]", "uses DX", "TIME alone"),
+        f'{MOTION} val_type="V" expr="WZ(20)"/>',
+        ("Motion_Joint[1]", "uses WZ", "the velocity must be", "TIME and displacements"),
     ),
     "user motion": (
         f'{MOTION} val_type="D" type="USERSUB"/>',

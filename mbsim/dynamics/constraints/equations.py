@@ -36,6 +36,7 @@ from mbsim.arrays.codes import (
     TOUCHING,
     TWIST,
     USUAL,
+    WHOLE,
 )
 from mbsim.arrays.hooks import Hook, Sticking, answer_of, note_failure
 from mbsim.arrays.scene import Scene
@@ -128,7 +129,7 @@ def fill_terms(scene: Scene, t: float, y: F1, e: int, anew: int) -> None:
     rate = flow
     if eq.program[e] >= 0:
         f, df, ddf = jet(scene, t, y, eq.program[e])
-        if eq.general[e] == 1:
+        if eq.general[e] == WHOLE:
             value, rate, second = value + f, df, second + ddf
         elif eq.level[e] == 2:
             value, rate, second = value - f, rate - df, second - ddf

@@ -187,7 +187,7 @@ def couple_equations(scene: Scene, P: Pattern) -> bool:
 def terms_behind(scene: Scene, e: int, term: int) -> tuple[int, int]:
     """Return the range of terms on whose bodies the gradient of a term depends."""
     eq = scene.equations
-    if eq.general[e] != 0 or eq.user[e] > 0:
+    if (eq.general[e] != 0 and eq.level[e] == 2) or eq.user[e] > 0:
         # one term for each body of one expression, or terms of one relation
         return eq.first[e], eq.first[e + 1]
     return term, term + 1
