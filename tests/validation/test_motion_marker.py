@@ -56,7 +56,7 @@ def test_a_deck_gives_motions_between_markers(tmp_path):
         (f'{MOTION} val_type="D" expr="1"/>', "direction: missing"),
         (f'{MOTION} direction="R" val_type="D" expr="1"/>', "must be one of X, Y, Z, B1, B2, B3"),
         (f'{MOTION} direction="X" val_type="D"/>', "Motion_Marker[3]: expr: missing"),
-        (f'{MOTION} direction="X" val_type="D" expr="DX(20)"/>', "Motion_Marker[3]: expr="),
+        (f'{MOTION} direction="X" val_type="D" expr="VX(20)"/>', "Motion_Marker[3]: expr="),
         (f'{MOTION.replace("10", "77")} direction="X" val_type="D" expr="1"/>', 'id="77": no'),
         (
             '<Motion_Joint id="3" joint_id="1" val_type="D" expr="0"/>'
