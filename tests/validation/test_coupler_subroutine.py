@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 import mbsim
 from helpers.libraries import compiled
+from helpers.shafts import TWO_SHAFTS
 from mbsim.errors import DeckError, ModelError, PluginError
 
 #: Of q2 = A sin q1, shafts of inertia 1 and 4, a torque of 3 on the first.
@@ -53,19 +54,11 @@ def FEW(id, time, par, npar, disp):
 def PLANET(id, time, par, npar, disp, ndisp, iflag):
     return disp[1] - par[0] * sin(disp[0]) + 0.5 * disp[0] * disp[2]
 """
-MODEL = """
-  <Body_Rigid id="1" isground="TRUE"/>
-  <Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="1" inertia_yy="1" inertia_zz="1"/>
-  <Body_Rigid id="3" cg_id="30" mass="1" inertia_xx="4" inertia_yy="4" inertia_zz="4"/>
-  <Reference_Marker id="10" body_id="1"/>
-  <Reference_Marker id="11" body_id="1" pos_x="1"/>
-  <Reference_Marker id="20" body_id="2"/>
-  <Reference_Marker id="30" body_id="3" pos_x="1"/>
-  <Constraint_Joint id="1" type="REVOLUTE" i_marker_id="20" j_marker_id="10"/>
-  <Constraint_Joint id="2" type="REVOLUTE" i_marker_id="30" j_marker_id="11"/>
-  {held}
-  <Force_Scalar_TwoBody id="1" type="Torque" i_marker_id="20" j_marker_id="10" expr="3"/>
+MODEL = (
+    TWO_SHAFTS
+    + """
   <Post_Request id="1" type="EXPRESSION" expr1="AZ(20,10)" expr2="AZ(30,11)" expr3="WZ(20)"/>"""
+)
 COUPLER = """<Constraint_Coupler id="1" joint1_id="1" freedom_1="R" joint2_id="2" freedom_2="R"
     usrsub_param_string="USER(0.7)" {file}/>"""
 SCRIPTED = COUPLER.format(file='script_name="cou.py" usrsub_fnc_name="{}"')

@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import mbsim
+from helpers.shafts import TWO_SHAFTS
 from mbsim.errors import Interrupted
 
 #: Methods and tolerances; GALPHA is of order 2, and would take minutes at 1e-9.
@@ -27,20 +28,12 @@ CART = """
   <Reference_Variable id="9" expr="DZ(20)"/>
   {motion}
   <Post_Request id="1" type="EXPRESSION" expr1="DZ(20)" expr2="VZ(20)" expr3="MOTION(1,0,4,0)"/>"""
-SHAFTS = """
-  <Body_Rigid id="1" isground="TRUE"/>
-  <Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="1" inertia_yy="1" inertia_zz="1"/>
-  <Body_Rigid id="3" cg_id="30" mass="1" inertia_xx="4" inertia_yy="4" inertia_zz="4"/>
-  <Reference_Marker id="10" body_id="1"/>
-  <Reference_Marker id="11" body_id="1" pos_x="1"/>
-  <Reference_Marker id="20" body_id="2"/>
-  <Reference_Marker id="30" body_id="3" pos_x="1"/>
-  <Constraint_Joint id="1" type="REVOLUTE" i_marker_id="20" j_marker_id="10"/>
-  <Constraint_Joint id="2" type="REVOLUTE" i_marker_id="30" j_marker_id="11"/>
-  {held}
-  <Force_Scalar_TwoBody id="1" type="Torque" i_marker_id="20" j_marker_id="10" expr="3"/>
+SHAFTS = (
+    TWO_SHAFTS
+    + """
   <Post_Request id="1" type="EXPRESSION" expr1="AZ(20,10)" expr2="AZ(30,11)" expr3="WZ(30)"
     {force}/>"""
+)
 DISPLACED = '<Motion_Joint id="1" joint_id="2" val_type="D" expr="2*SIN(AZ(20,10))+TIME"/>'
 RUN = '<Simulate end_time="2" num_steps="4"/>'
 
