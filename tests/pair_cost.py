@@ -1,4 +1,7 @@
-"""Print what one call of a pair costs, of closed forms and of meshes, in a compiled loop."""
+"""Print what one call of a pair costs, of closed forms and of meshes, in a compiled loop.
+
+Of meshes twice: where both trees are walked, and where what the walk found is kept.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +18,7 @@ from mbsim.core.address import call_int
 from mbsim.geometry.catalog import AREA, PAIRS, POINT, REGION_ROWS, REGIONS
 from mbsim.model.flat_parts import fewer_triangles
 from mbsim.model.mesh import merge_vertices
+from mbsim.model.surface import LISTS
 
 SHAPES = {
     **SIZES,
@@ -60,13 +64,22 @@ def call_often(address, arrays, count):
     return total
 
 
-def cost_of(address, arrays, calls=CALLS):
+@njit
+def call_anew(address, arrays, rows, count):
+    """Call a pair `count` times with other rows each time, so that no walk is kept for it."""
+    total = 0
+    for k in range(count):
+        total += call_int(address, (*arrays, rows[k % len(rows)]))
+    return total
+
+
+def cost_of(call, *arguments, calls=CALLS):
     """Return the time of a call [ns]."""
-    call_often(address, arrays, 10)
+    call(*arguments, 10)
     times = []
     for _ in range(5):
         begin = time.perf_counter()
-        call_often(address, arrays, calls)
+        call(*arguments, calls)
         times.append(time.perf_counter() - begin)
     return min(times) / calls * 1e9
 
@@ -131,11 +144,16 @@ def mesh_cases():
 def print_meshes():
     cases, _meshes = mesh_cases()
     for label, name, *arrays in cases:
-        points = np.zeros((PAIRS[name].slots, POINT))
-        cost = cost_of(pair_address(PAIRS[name]), (*arrays, points), 50)
+        rows = np.zeros((LISTS + 1, PAIRS[name].slots, POINT))
+        address = pair_address(PAIRS[name])
+        anew = cost_of(call_anew, address, tuple(arrays), rows, calls=50)
+        kept = cost_of(call_often, address, (*arrays, rows[0]), calls=50)
         step = REGION_ROWS if PAIRS[name].patches else 1
-        touching = int((points[::step, 0] > 0.0).sum())
-        print(f"{label:38s}{cost / 1e3:8.1f} us, {touching} points touch")
+        touching = int((rows[0, ::step, 0] > 0.0).sum())
+        print(
+            f"{label:38s}{anew / 1e3:8.1f} us, {kept / 1e3:.1f} us again in the same pose,"
+            f" {touching} points touch"
+        )
 
 
 def main():
@@ -145,9 +163,9 @@ def main():
         arrays = (frame_i, size_i, frame_j, size_j, points)
         region = ""
         if name in REGIONS:
-            cost = cost_of(region_address(name), arrays)
+            cost = cost_of(call_often, region_address(name), arrays)
             region = f", as one region {cost:.0f} ns, area {points[1, AREA]:.3g}"
-        cost = cost_of(pair_address(PAIRS[name]), arrays)
+        cost = cost_of(call_often, pair_address(PAIRS[name]), arrays)
         touching = int((points[: PAIRS[name].slots, 0] > 0.0).sum())
         print(f"{label:34s}{cost:8.0f} ns, {touching} points touch{region}")
     print_meshes()
