@@ -115,6 +115,29 @@ def sphere(
     return f"{whole}\n<Post_Graphic {graphic}/>"
 
 
+def cuboid(
+    number: int,
+    mass: float,
+    edges: Sequence[float],
+    position: Sequence[float],
+    velocity: Sequence[float] = (0.0, 0.0, 0.0),
+    axes: Sequence[Sequence[float]] | None = None,
+) -> str:
+    """Return a solid box about its centre: a body with graphic `100 number`; see `body`."""
+    a, b, c = (float(edge) for edge in edges)
+    inertia = [mass * (u * u + v * v) / 12.0 for u, v in ((b, c), (a, c), (a, b))]
+    graphic = attributes(
+        id=100 * number,
+        type="BoxDefinedFromCenter",
+        center_marker_id=10 * number,
+        length_x=a,
+        length_y=b,
+        length_z=c,
+    )
+    whole = body(number, mass, inertia, position, velocity, axes=axes)
+    return f"{whole}\n<Post_Graphic {graphic}/>"
+
+
 def contact(number: int, i: Sequence[int], j: Sequence[int], **law: object) -> str:
     """Return a Force_Contact between the graphics `i` and `j`."""
     sides = attributes(

@@ -18,6 +18,7 @@ class Code(IntEnum):
     USER_NOT_FINITE = 5  # what a user's law made of finite input
     TOO_FAR = 6  # a trial point that the list of near pairs does not reach: a shorter step does
     CROWDED = 7  # more near pairs than there are places for
+    MANY_POINTS = 8  # more contact points in reach than places: a shorter step reaches fewer
     CONTRADICTION = 9  # constraints, in the course of the motion
     JAMMED = 10  # friction and reactions raise each other without end
     NO_ROOM = 11  # more coupled bodies than a linearisation has places for

@@ -104,6 +104,8 @@ CUT_GROW = 2.0
 #: A hook that fails is tried again at a tenth of the step, so many times; one whose numbers are
 #: not finite may be so for a trial far out of reach.
 MOST_FAILURES, MOST_NOT_FINITE = 5, 20
+#: What a step fails by that is too long for it, and a shorter one does not.
+REACHES = (Code.TOO_FAR, Code.MANY_POINTS)
 #: A step that ends behind the last failure takes so much from the count of failures. Until then
 #: nothing shows that the hook gives numbers there: before it a step may be too short to ask.
 FORGIVEN = 0.1
@@ -209,8 +211,10 @@ def gives_up(m: Method, code: int, t: float, h: float, floor: float) -> bool:
     Else it is tried again nearer: a trial far ahead may be where no law was meant for. What a
     shorter step is known to mend is not counted.
     """
-    if code in (Code.NOT_CONVERGED, Code.TOO_FAR):
+    if code == Code.NOT_CONVERGED:
         return False
+    if code in REACHES:
+        return h <= floor
     m.memory[FAILURES] += 1.0
     m.memory[FAILED_AT] = t + h
     most = MOST_NOT_FINITE if code == Code.NOT_FINITE else MOST_FAILURES
@@ -381,8 +385,6 @@ def go_on(  # noqa: C901
         error = m.memory[LAST_ERROR]
         if code != 0:
             ends = gives_up(m, code, t, h, floor)
-            if code == Code.TOO_FAR and h <= floor:
-                ends = True
             if ends and code != Code.NOT_FINITE:
                 m.counts[CODE] = code
                 return FAILED

@@ -107,6 +107,7 @@ def _not_finite(system: System) -> list[str]:
 _PLAIN: dict[int, str] = {
     Code.TOO_FAR: "shapes moved further in a step than is known of what is near them",
     Code.NO_ROOM: "more bodies act on each other than a linearisation has room for",
+    Code.MANY_POINTS: "more contact points are in reach of a step than there is room for",
     Code.SINGULAR: "the linear equations of an implicit step have no solution",
 }
 

@@ -96,7 +96,7 @@ def find_points(scene: Scene, S: Stepping, y: F1, h: float, committed: bool) -> 
             else:
                 room = look_ahead_of(scene, S, y, pair, h, depth)
         if not room:
-            return Code.NO_ROOM
+            return Code.MANY_POINTS
     log.counters[NARROWPHASE] += measured
     log.counters[SKIPPED] += pairs_awake(scene, S) - measured
     return 0
@@ -146,7 +146,7 @@ def find_missed(scene: Scene, S: Stepping, y: F1, h: float) -> int:
         elif M.taken[pair] != M.taken[len(M.taken) - 1]:
             room = meets_after_all(scene, S, y, pair, h)
         if not room:
-            return -Code.NO_ROOM
+            return -Code.MANY_POINTS
     if farther:
         for k in range(graphics_awake(scene)):
             g = graphic_awake(scene, k)

@@ -219,7 +219,7 @@ def prepare_points(scene: Scene, S: Stepping, h: float) -> int:
     count, begin = S.tally.count[POINTS], 0
     for k in range(count):
         if not fill_point(scene, S, k, begin):
-            return Code.NO_ROOM
+            return Code.MANY_POINTS
         begin += P.many[k] if P.wide[k] >= 0 else 0
     recall(S, h)
     for k in range(count):

@@ -10,7 +10,7 @@ import pytest
 import mbsim
 from helpers import rigid_decks as decks
 from mbsim.bench import deck as text
-from mbsim.errors import ModelError
+from mbsim.errors import ModelError, SolverError
 
 #: A plate of 2 mm across x, its middle at 1 m.
 PLATE = (
@@ -119,3 +119,41 @@ def test_what_fcl_measures_is_refused_by_name(tmp_path: Path) -> None:
     model = decks.ball(tmp_path, 0.5, 0.5, 0.1, 0.01)
     with pytest.raises(ModelError, match=r"Force_Contact\[301\].*MOREAU.*FCL"):
         mbsim.simulate(model, integrator="MOREAU", detector="fcl")
+
+
+def boxes_in_flight(rise: float) -> list[str]:
+    """Return eight boxes side by side, 0.25 m above a plane, that fly up at `rise` [m/s]."""
+    ids = [200 + 100 * k for k in range(8)]
+    return [
+        text.GROUND,
+        text.FLOOR,
+        *(
+            text.cuboid(2 + k, 1.0, (0.1, 0.1, 0.1), (float(k), 0.0, 0.3), (0.0, 0.0, rise))
+            for k in range(8)
+        ),
+        text.contact(301, ids, [100], **decks.rubbed(0.3)),
+        text.gravity(),
+    ]
+
+
+def test_a_step_that_reaches_more_points_than_there_is_room_for_is_taken_shorter(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Long steps of free flight reach all corners of all boxes; none of them touches."""
+    monkeypatch.setattr("mbsim.stepping.setup.POINTS_EACH", 1)
+    deck = text.deck("near", boxes_in_flight(4.0), 0.8)
+    results = mbsim.simulate(deck, integrator="MOREAU", tol=1e-2)
+    assert results.stats["rejected"] > 0
+    t = results["time"]
+    height = 0.3 + 4.0 * t - 0.5 * 9.81 * t**2
+    np.testing.assert_allclose(results["bodies/2/position"][:, 2], height, atol=1e-9)
+
+
+def test_touching_points_without_room_end_the_run_and_are_said(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """They fall by 0.25 m in 0.2258 s."""
+    monkeypatch.setattr("mbsim.stepping.setup.POINTS_EACH", 1)
+    deck = text.deck("near", boxes_in_flight(0.0), 0.8)
+    with pytest.raises(SolverError, match=r"more contact points .* room for at time 0\.2257"):
+        mbsim.simulate(deck, integrator="MOREAU", tol=1e-2)

@@ -15,24 +15,13 @@ DMAX = 1e-5  # m, of IMPACT's damper; the depth at rest is twice that
 
 
 def _deck(comment: str, mu: float, end_time: float, vs: float) -> str:
-    a, b, c = p.S4.size
-    inertia = [p.S4.mass * (u * u + v * v) / 12.0 for u, v in ((b, c), (a, c), (a, b))]
-    box = text.attributes(
-        id=200,
-        type="BoxDefinedFromCenter",
-        center_marker_id=20,
-        length_x=a,
-        length_y=b,
-        length_z=c,
-    )
     law = text.impact(p.S4.law.k, 1.0, p.S4.law.c, DMAX) | text.coulomb(mu, vs)
     return text.deck(
         comment,
         [
             text.GROUND,
             text.FLOOR,
-            text.body(2, p.S4.mass, inertia, (0.0, 0.0, 0.5 * c - DEPTH)),
-            f"<Post_Graphic {box}/>",
+            text.cuboid(2, p.S4.mass, p.S4.size, (0.0, 0.0, 0.5 * p.S4.size[2] - DEPTH)),
             text.contact(301, [200], [100], **law),
             text.gravity(p.GRAVITY * math.sin(p.S4.tilt), -p.GRAVITY * math.cos(p.S4.tilt)),
         ],
