@@ -58,11 +58,10 @@ def settings(
     scene: Scene, integrators: Sequence[str], tolerances: Sequence[float]
 ) -> list[Setting]:
     """Return all settings of a scene; no `integrators` or `tolerances` means the scene's own."""
-    chosen = integrators or scene.integrators or able(scene.deck(scene.variations[0]))
     return [
         Setting(integrator, tol, variation)
         for variation in scene.variations
-        for integrator in chosen
+        for integrator in integrators or scene.integrators or able(scene.deck(variation))
         for tol in (tolerances or scene.tolerances)
     ]
 

@@ -144,6 +144,44 @@ class SliderCrank(NamedTuple):
     end_time: float  # s
 
 
+@dataclass(frozen=True)  # a NamedTuple has a method `count` of its own
+class Stack:
+    """S6: cubes on each other on the plane z = 0, touching, at rest."""
+
+    count: int
+    edge: float  # m
+    mass: float  # kg, of one cube
+    mu: float
+    end_time: float  # s
+    law: LinearLaw  # of each corner
+
+
+class HeavyOnLight(NamedTuple):
+    """S10b: a heavy cube on a light one on the plane z = 0, touching, at rest."""
+
+    edge: float  # m
+    mass: float  # kg, below
+    above: float  # kg
+    mu: float
+    end_time: float  # s
+    law: LinearLaw  # of each corner
+
+
+class Bin(NamedTuple):
+    """Cubes fall from a grid, each turned at random, into an open box."""
+
+    edge: float  # m
+    mass: float  # kg, of one cube
+    mu: float
+    half_width: float  # m, half the inner width of the box
+    pitch: float  # m
+    floor: float  # m, height of the lowest centres
+    end_time: float  # s
+    sample: float  # s
+    late: float  # s, from here on the depth counts as that of a pile at rest
+    law: LinearLaw  # of each corner
+
+
 class FallingTorus(NamedTuple):
     """S9: a mesh torus falls on the plane z = 0, tilted about x, or upright onto a fixed one."""
 
@@ -264,6 +302,25 @@ S7 = Grains(
     law=LinearLaw(k=1e5, c=20.0),
 )
 
+S6 = Stack(count=10, edge=0.2, mass=1.0, mu=0.5, end_time=10.0, law=LinearLaw(k=1e5, c=30.0))
+#: S10b: stiff enough that the heavy one's weight sinks into the light one by a hundredth of it.
+S10B = HeavyOnLight(
+    edge=0.2, mass=1.0, above=1e4, mu=0.5, end_time=5.0, law=LinearLaw(k=1e8, c=3e3)
+)
+
+BIN = Bin(
+    edge=0.04,
+    mass=0.064,
+    mu=0.4,
+    half_width=0.21,
+    pitch=0.08,
+    floor=0.06,
+    end_time=2.0,
+    sample=0.02,
+    late=1.5,
+    law=LinearLaw(k=1e5, c=10.0),
+)
+
 S8 = Chain(length=2.0, mass=1.0, end_time={2: 5.0, 10: 2.0, 40: 2.0})
 #: Inertia of a slender rod over m l^2: about its own axis, and across at its middle.
 ROD_ALONG, ROD_ACROSS = 1e-3, 1.0 / 12.0
@@ -357,3 +414,32 @@ def rod_inertia(mass: float, length: float) -> tuple[float, float, float]:
     """Principal inertia of a slender rod along x about its middle (kg m^2)."""
     across = ROD_ACROSS * mass * length**2
     return (ROD_ALONG * mass * length**2, across, across)
+
+
+def s6_positions() -> list[tuple[float, float, float]]:
+    """Centres of the cubes of S6 at t = 0 (m), from below."""
+    return [(0.0, 0.0, (k + 0.5) * S6.edge) for k in range(S6.count)]
+
+
+def bin_start(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Centres (count, 3) (m) and quaternions (count, 4), w first, of the cubes of a bin at t = 0.
+
+    Layers of 5 by 5; attitudes are uniform over all rotations, drawn by ``RandomState(0)``.
+    """
+    across = (np.arange(5) - 2.0) * BIN.pitch
+    up = BIN.floor + BIN.pitch * np.arange(math.ceil(count / 25))
+    z, y, x = np.meshgrid(up, across, across, indexing="ij")
+    drawn = np.random.RandomState(0).normal(size=(count, 4))
+    places = np.column_stack([x.ravel(), y.ravel(), z.ravel()])[:count]
+    return places, drawn / np.linalg.norm(drawn, axis=1, keepdims=True)
+
+
+def axes_of(quaternion: np.ndarray) -> np.ndarray:
+    """Rotation matrices (..., 3, 3), body to world, of unit quaternions (..., 4), w first."""
+    w, x, y, z = np.moveaxis(np.asarray(quaternion), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))

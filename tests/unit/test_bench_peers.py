@@ -12,7 +12,7 @@ import pytest
 from mbsim.bench import parameters as p
 from mbsim.bench import peers
 from mbsim.bench.outcome import Outcome
-from mbsim.bench.peers import common, exudyn_scenes, mujoco_laws
+from mbsim.bench.peers import common, exudyn_scenes, laws, ode
 from mbsim.bench.scenes import all_scenes
 
 
@@ -83,13 +83,15 @@ def test_drop_leaves_the_plane_at_the_speed_of_its_law(engine, scene, setting, l
 
 
 CONTACT = ("S1", "S2a", "S3", "S4stick", "S4slip", "S5", "S7_125", "S10a", "S10c")
+BOXES = ("S6", "S10b", "bin_50", "bin_200")
 MESHES = ("S9plane",)
 JOINTS = ("S8_2", "S8_10", "S8_40", "S8b")
 SCENES_OF = {
-    "mujoco": CONTACT + JOINTS + MESHES,
+    "mujoco": CONTACT + JOINTS + MESHES + BOXES,
     "exudyn": CONTACT + JOINTS,
     "pybullet": CONTACT + MESHES,
     "drake": (*JOINTS, *MESHES, "S9torus"),
+    "ode": ("S3", "S4stick", "S4slip", "S7_125", "S7_1000", "S9plane", "S9torus", *BOXES),
 }
 
 
@@ -103,7 +105,7 @@ def test_every_setting_is_known_and_unknown_scenes_have_none(engine):
     assert module.settings("S99") == []
 
 
-@pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
+@pytest.mark.parametrize("engine", ["mujoco", "pybullet", "ode"])
 def test_every_setting_stores_the_rows_that_are_asked_for(engine):
     module = peers.load(engine)
     for name, scene in all_scenes().items():
@@ -117,7 +119,8 @@ def test_exudyn_has_steps_short_enough_for_the_rows_in_every_scene():
     for name, scene in all_scenes().items():
         cases = [make() for make in exudyn_scenes.cases(name).values()]
         if not cases:
-            assert name.startswith(("S9", "S11_")), "meshes and the stiff decks it does not have"
+            # meshes, the stiff decks, boxes on boxes: it does not have them
+            assert name.startswith(("S9", "S11_")) or name in BOXES
             continue
         assert any(case.solver.step <= scene.sample for case in cases)
         assert all(case.sample == scene.sample for case in cases)
@@ -126,7 +129,7 @@ def test_exudyn_has_steps_short_enough_for_the_rows_in_every_scene():
 def test_laws_that_are_compiled_use_plain_numbers():
     # a field of a dataclass cannot be read in compiled code, which fails at the first run only
     _run("mujoco", "S5", "mjcb_passive compiled Euler dt=0.0001")
-    assert mujoco_laws.hertz(1e-4, 0.0) == p.S5.k * 1e-4**p.S5.e
+    assert laws.hertz(1e-4, 0.0) == p.S5.k * 1e-4**p.S5.e
 
 
 def test_box_sticks_and_the_body_is_where_it_was():
@@ -184,13 +187,39 @@ def test_nothing_imports_an_engine_before_it_runs():
     code = (
         "import sys; from mbsim.bench import peers\n"
         "found = peers.available(); [peers.load(n).settings('S1') for n in peers.ENGINES]\n"
-        "print(found, [n for n in peers.ENGINES.values() if n in sys.modules])"
+        "print(found, [n for n in peers.PACKAGES.values() if n in sys.modules])"
     )
     out = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.strip()
-    found = [n for n, engine in peers.ENGINES.items() if importlib.util.find_spec(engine)]
+    found = [n for n, engine in peers.PACKAGES.items() if importlib.util.find_spec(engine)]
+    found += ["ode"] if ode.is_installed() else []
     assert out == f"{found} []"
+
+
+@pytest.mark.parametrize(
+    ("scene", "setting", "measure", "bound"),
+    [
+        ("S3", "Step dt=0.001", "x_abs", 1e-3),
+        ("S4stick", "Step dt=0.005", "creep_abs", 1e-7),
+        ("S4slip", "QuickStep 20 dt=0.001", "acc_rel", 1e-2),
+        ("S9plane", "QuickStep 20 dt=0.005", "z_error", 1e-6),
+        ("S10b", "Step dt=0.005", "pen_max", 1e-5),
+        ("bin_50", "QuickStep 20 dt=0.005", "pen_late", 2e-3),
+    ],
+)
+def test_ode_comes_to_what_is_known(scene, setting, measure, bound):
+    outcome = _run("ode", scene, setting)
+    assert all_scenes()[scene].errors(outcome, "")[measure] < bound
+    assert np.linalg.norm(outcome.quaternion, axis=-1) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_what_the_driver_of_ode_cannot_read_is_an_error(monkeypatch):
+    if "ode" not in peers.available():
+        pytest.skip("ode is not installed")
+    monkeypatch.setattr(ode, "_numbers", lambda case, steps: iter([1e-3, 1.0]))
+    with pytest.raises(RuntimeError, match="the scene ends too soon"):
+        ode.run("S3", "Step dt=0.001", 1)
 
 
 def test_rows_meet_the_steps():

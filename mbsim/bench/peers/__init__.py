@@ -1,6 +1,6 @@
 """Other engines that the scenes are run on, where they are installed.
 
-Only the modules in this folder import an engine, and only when one of them is asked for. Each has
+Only the modules in this folder use an engine, and only when one of them is asked for. Each has
 ``NAME``, ``version()``, ``settings(scene)`` and ``run(scene, setting, repeats)``.
 """
 
@@ -11,12 +11,15 @@ import importlib.util
 from types import ModuleType
 
 #: Module in this folder, and the import name of its engine.
-ENGINES = {"mujoco": "mujoco", "exudyn": "exudyn", "pybullet": "pybullet", "drake": "pydrake"}
+PACKAGES = {"mujoco": "mujoco", "exudyn": "exudyn", "pybullet": "pybullet", "drake": "pydrake"}
+#: All engines: ODE is a library of the system.
+ENGINES = (*PACKAGES, "ode")
 
 
 def available() -> list[str]:
-    """Names of the engines that can be imported; none of them is imported to find out."""
-    return [name for name, engine in ENGINES.items() if importlib.util.find_spec(engine)]
+    """Names of the engines that are installed; none of them is imported to find out."""
+    found = [name for name, engine in PACKAGES.items() if importlib.util.find_spec(engine)]
+    return [*found, "ode"] if load("ode").is_installed() else found
 
 
 def load(name: str) -> ModuleType:

@@ -19,6 +19,7 @@ import numpy as np
 from mbsim.bench import parameters as p
 from mbsim.bench.outcome import Outcome
 from mbsim.bench.peers import common
+from mbsim.bench.peers import mujoco_boxes as boxes
 from mbsim.bench.peers import mujoco_linkages as jointed
 from mbsim.bench.peers.laws import Law, hertz, hunt_crossley, impact, linear, stiff
 from mbsim.bench.peers.mujoco_laws import (
@@ -163,10 +164,14 @@ def _cases(scene: str) -> dict[str, Callable[[], Case]]:
         "S4stick": lambda: _box(p.S4.mu_stick, p.S4.stick_end_time, (1e-2, 2e-3, 5e-4)),
         "S4slip": lambda: _box(p.S4.mu_slip, p.S4.slip_end_time, (1e-2, 2e-3, 5e-4, 1e-4)),
         "S5": _row,
+        "S6": lambda: boxes.pile([p.S6.mass] * p.S6.count, p.S6),
         "S8b": _slider_crank,
         "S9plane": _torus,
         "S10a": _stiff_drop,
+        "S10b": lambda: boxes.pile([p.S10B.mass, p.S10B.above], p.S10B),
         "S10c": lambda: _free(p.S10C),
+        "bin_50": lambda: boxes.bin_of(50),
+        "bin_200": lambda: boxes.bin_of(200),
     }
     return dict(scenes[scene]()) if scene in scenes else {}
 

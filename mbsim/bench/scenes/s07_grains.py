@@ -28,7 +28,7 @@ _WALLS = (
 )
 
 
-def _walls(half: float) -> list[str]:
+def walls(half: float) -> list[str]:
     """Return floor and four walls as planes whose normal, the marker's z, points inward.
 
     R = Rz(psi) Rx(theta) with theta = -90 degrees takes z to (-sin psi, cos psi, 0).
@@ -59,7 +59,7 @@ def _deck(count: int, variation: Variation) -> str:
         f"{count} spheres fall into an open box",
         [
             text.GROUND,
-            *_walls(p.s7_half_width(count)),
+            *walls(p.s7_half_width(count)),
             *spheres,
             text.contact(301, ids, ids, **law),
             text.contact(302, ids, box, **law),
