@@ -20,6 +20,7 @@ from mbsim.bench.front import (
 )
 from mbsim.bench.measurement import OURS, Measurement
 from mbsim.bench.scene import Scene
+from mbsim.bench.whole import Whole
 from mbsim.errors import ResultsError
 
 #: Columns of `bench.csv` before those of the error measures and counts.
@@ -113,6 +114,7 @@ def markdown(
     rows: Sequence[Measurement],
     cells: Sequence[Cell],
     absent: Sequence[str],
+    wholes: Sequence[Whole] = (),
 ) -> str:
     """Return the whole report as text."""
     versions = dict.fromkeys(f"{row.engine} {row.version}" for row in rows)
@@ -132,6 +134,8 @@ def markdown(
     parts += ["## Our time with the number of spheres", many] if many else []
     long = chain_growth(rows)
     parts += ["## Our time with the number of rods", long] if long else []
+    if wholes:
+        parts += ["## Whole runs: from the start of a process to its end", whole_table(wholes)]
     for scene in scenes:
         parts += [f"## {scene.name}: {scene.title}", front_table(scene, rows)]
     failures = _failures(scenes, rows)
@@ -224,6 +228,22 @@ def front_table(scene: Scene, rows: Sequence[Measurement]) -> str:
                 *(f"{row.errors[name]:.2g}" if name in row.errors else "" for name in measures),
             ]
             for row in chosen
+        ],
+    )
+
+
+def whole_table(wholes: Sequence[Whole]) -> str:
+    """Return what whole runs took beside their loops, and the most memory of each."""
+    return table(
+        ("scene", "engine", "setting", "error", "loop [s]", "whole [s]", "memory [MB]", ""),
+        [
+            [
+                *(whole.scene, whole.engine, whole.setting, f"{whole.error:.2g}"),
+                *(f"{whole.loop_s:.3g}", f"{whole.whole_s:.3g}"),
+                "" if whole.memory_mb is None else f"{whole.memory_mb:.0f}",
+                whole.note,
+            ]
+            for whole in wholes
         ],
     )
 

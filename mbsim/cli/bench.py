@@ -13,6 +13,7 @@ from mbsim.cli.options import json_option
 
 if TYPE_CHECKING:
     from mbsim.bench.runner import Options, Report
+    from mbsim.bench.whole import Whole
 
 
 #: CPU time that a case of stress may take, s.
@@ -36,7 +37,7 @@ def _numbers(ctx: click.Context, parameter: click.Parameter, value: str | None) 
     default=Path("bench"),
     show_default=True,
     metavar="DIR",
-    help="Folder for bench.csv, bench.md, a picture a scene, and the decks.",
+    help="Folder for bench.csv, bench.md, bench.html, a picture a scene, and the decks.",
 )
 @click.option(
     "--tol",
@@ -79,8 +80,8 @@ def command(
 ) -> None:
     """Run SCENEs (default: all) here and on the peers that are installed.
 
-    Writes DIR/bench.csv, bench.md and, with matplotlib, one PNG a scene; with --stress
-    DIR/stress.csv and stress.md.
+    Writes DIR/bench.csv, bench.md, bench.html and, with matplotlib, one PNG a scene; with
+    --stress DIR/stress.csv and stress.md.
     """
     if stress:
         given = click.get_current_context().get_parameter_source
@@ -92,7 +93,7 @@ def command(
                 )
         _stress(scenes, output, tolerances, integrators, as_json)
         return
-    from mbsim.bench import peers, plot, report, runner
+    from mbsim.bench import page, peers, plot, report, runner, whole
     from mbsim.cli.messages import print_json
 
     installed = [] if no_peers else peers.available()
@@ -104,15 +105,16 @@ def command(
     options = runner.Options(chosen, methods, tolerances, repeats, installed)
     report.write_text(output / "bench.csv", "")  # now, not after minutes, if DIR cannot be used
     done = runner.run(options, output, _say)
-    text = report.markdown(
-        done.machine, chosen, done.rows, done.cells, list(peers.ENGINES) if no_peers else missing
-    )
+    wholes = whole.measure(chosen, whole.chosen(chosen, done.rows, done.cells), output / "decks")
+    absent = list(peers.ENGINES) if no_peers else missing
+    text = report.markdown(done.machine, chosen, done.rows, done.cells, absent, wholes)
     report.write_text(output / "bench.md", text)
-    pictures = _draw(options, done, output) if plot.available() else []
+    pictures = _draw(options, done, output) if plot.available() else {}
+    report.write_text(output / "bench.html", page.page(text, pictures))
     if not plot.available():
         _say("no pictures: matplotlib is not installed; mbsim-contact[plot] has it")
     if as_json:
-        print_json(_as_json(done, output, pictures))
+        print_json(_as_json(done, wholes, output, pictures))
     else:
         echo(text, nl=False)
     _say(f"{len(done.rows)} measurements in {output / 'bench.csv'}")
@@ -155,20 +157,22 @@ def _say(text: str) -> None:
     echo(f"mbsim: {text}", err=True)
 
 
-def _draw(options: Options, done: Report, output: Path) -> list[str]:
-    """Draw every scene that has a result, and return the files."""
+def _draw(options: Options, done: Report, output: Path) -> dict[str, Path]:
+    """Draw every scene that has a result, and return the files by scene."""
     from mbsim.bench import plot
 
-    drawn = []
+    drawn = {}
     for scene in options.scenes:
         if any(row.scene == scene.name and row.errors for row in done.rows):
             path = output / f"{scene.name}.png"
             plot.draw(scene, done.rows, path)
-            drawn.append(str(path))
+            drawn[scene.name] = path
     return drawn
 
 
-def _as_json(done: Report, output: Path, pictures: list[str]) -> dict[str, object]:
+def _as_json(
+    done: Report, wholes: list[Whole], output: Path, pictures: dict[str, Path]
+) -> dict[str, object]:
     """Return the report as JSON has it; what is no number is null."""
     from mbsim.results.form import finite
 
@@ -176,5 +180,9 @@ def _as_json(done: Report, output: Path, pictures: list[str]) -> dict[str, objec
         "machine": done.machine,
         "rows": [finite(row._asdict()) for row in done.rows],
         "cells": [finite(cell._asdict()) for cell in done.cells],
-        "files": [str(output / "bench.csv"), str(output / "bench.md"), *pictures],
+        "whole_runs": [finite(whole._asdict()) for whole in wholes],
+        "files": [
+            *(str(output / name) for name in ("bench.csv", "bench.md", "bench.html")),
+            *map(str, pictures.values()),
+        ],
     }

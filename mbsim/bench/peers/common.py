@@ -77,9 +77,10 @@ def measure(once: Callable[[], tuple[float, Any]], repeats: int) -> tuple[float,
 
     `once` returns the wall time of its stepping loop and what it stored. A run of more than
     `LONG_RUN` is not repeated: its own noise is small beside it, and a warm-up changes nothing.
+    With `repeats` 0 the first run is all.
     """
     wall, stored = once()
-    if wall > LONG_RUN:
+    if wall > LONG_RUN or repeats == 0:
         return wall, stored
     walls = []
     for _ in range(repeats):
