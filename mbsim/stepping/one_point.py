@@ -43,6 +43,9 @@ FAR = 3.0
 #: Newton iterations for the slip of a point at most, and where its friction is on the cone: the
 #: next visit begins with the iteration's last step.
 MOST_SLIPS, ON_CONE = 60, 1e-12
+#: What of W couples n with the plane of contact, or tells its directions apart, is none below this
+#: part: of round bodies that is what rounding leaves.
+ROUND = 1e-14
 
 
 @jitable
@@ -110,14 +113,8 @@ def alone(p: Points, k: int, side: int, a: int, c: int) -> float:
 
 @jitable
 def answer_of(p: Points, k: int, a: int, e: int) -> float:
-    """Return u_a by r_e at point k."""
+    """Return u_a by r_e at point k, where joints hold its bodies."""
     total = 0.0
-    if p.wide[k] < 0:
-        row, i, j = p.given[k], 3 * a, 3 * e
-        for c in range(3):
-            total += row[TURN + i + c] * row[SPIN + j + c]
-            total += row[TURN + 9 + i + c] * row[SPIN + 9 + j + c]
-        return total + (row[LIGHT] + row[LIGHT + 1] if a == e else 0.0)
     for at in range(p.wide[k], p.wide[k] + p.many[k]):
         for side in range(2):
             if p.moved[at] == p.body[k, side]:
@@ -161,9 +158,12 @@ def fill_inverse(row: F1) -> None:
     part = 1.0 / a[0] if some else 0.0
     row[ALONG] = part
     row[ALONG + 1], row[ALONG + 2] = part * a[1], part * a[2]
-    row[SCHUR] = b[1] - part * a[1] * a[1]
-    row[SCHUR + 1] = b[2] - part * a[1] * a[2]
-    row[SCHUR + 2] = c[2] - part * a[2] * a[2]
+    s11, s12, s22 = b[1] - part * a[1] * a[1], b[2] - part * a[1] * a[2], c[2] - part * a[2] * a[2]
+    couples = part * max(abs(a[1]), abs(a[2]))
+    if couples <= ROUND and max(abs(s12), abs(s11 - s22)) <= ROUND * s11:
+        row[ALONG + 1] = row[ALONG + 2] = s12 = 0.0
+        s22 = s11
+    row[SCHUR], row[SCHUR + 1], row[SCHUR + 2] = s11, s12, s22
 
 
 @jitable
@@ -193,6 +193,10 @@ def slip_of(row: F1, height: float, c: tuple[float, float], mu: float, s: float)
     w1, w2 = row[ALONG + 1], row[ALONG + 2]
     s11, s12, s22 = row[SCHUR], row[SCHUR + 1], row[SCHUR + 2]
     size = math.sqrt(c[0] * c[0] + c[1] * c[1])
+    if w1 == 0.0 and w2 == 0.0 and s12 == 0.0 and s11 == s22:
+        # W is the same in all directions: friction is against c
+        part = -mu * height / size
+        return part * c[0], part * c[1], s
     low, high = 0.0, -1.0
     usual = size / (mu * height) - 0.5 * (s11 + s22)
     if not FAR * s >= usual or not s <= FAR * usual:

@@ -7,7 +7,7 @@ import math
 from mbsim.arrays.hooks import Hook, Joints, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
-from mbsim.core.arrays import F1
+from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import any_tangent, cross, dot, norm, vector
 from mbsim.dynamics.bodies.awake import graphic_awake, graphics_awake
@@ -131,23 +131,46 @@ def take_rows(scene: Scene, S: Stepping, y: F1, pair: int, within: tuple[float, 
 
 
 @jitable
-def put_side(scene: Scene, S: Stepping, k: int, side: int) -> None:
-    """Fill what point k does to one of its bodies, and how that turns it."""
+def put_three(row: F1, at: int, a: V3, b: V3, c: V3) -> None:
+    """Write three vectors from a place in a row on."""
+    row[at], row[at + 1], row[at + 2] = a[0], a[1], a[2]
+    row[at + 3], row[at + 4], row[at + 5] = b[0], b[1], b[2]
+    row[at + 6], row[at + 7], row[at + 8] = c[0], c[1], c[2]
+
+
+@jitable
+def put_side(
+    S: Stepping, k: int, side: int, axes: tuple[V3, V3, V3]
+) -> tuple[float, float, float, float, float, float]:
+    """Fill what point k does to one of its bodies, and how that turns it; return its part of W.
+
+    That is of (nn, nx, nz, xx, xz, zz); none of ground.
+    """
     P, b, row = S.points, S.points.body[k, side], S.points.given[k]
     at, to = TURN + 9 * side, SPIN + 9 * side
-    if b == len(scene.bodies.mass):
+    if b == len(S.motion.inverse):
         for c in range(9):
             row[at + c] = row[to + c] = 0.0
         row[LIGHT + side] = 0.0
-        return
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     inverse, arm = S.motion.inverse[b], vector(P.arm[k, side])
-    row[LIGHT + side] = inverse[0, 0]
-    x, y, z = vector(inverse[3], 3), vector(inverse[4], 3), vector(inverse[5], 3)
-    for a in range(3):
-        turn = cross(arm, vector(row, AXES + 3 * a))
-        i, j = at + 3 * a, to + 3 * a
-        row[i], row[i + 1], row[i + 2] = turn[0], turn[1], turn[2]
-        row[j], row[j + 1], row[j + 2] = dot(x, turn), dot(y, turn), dot(z, turn)
+    light = inverse[0, 0]
+    row[LIGHT + side] = light
+    n, x, z = cross(arm, axes[0]), cross(arm, axes[1]), cross(arm, axes[2])
+    put_three(row, at, n, x, z)
+    i, j, m = vector(inverse[3], 3), vector(inverse[4], 3), vector(inverse[5], 3)
+    by_n = (dot(i, n), dot(j, n), dot(m, n))
+    by_x = (dot(i, x), dot(j, x), dot(m, x))
+    by_z = (dot(i, z), dot(j, z), dot(m, z))
+    put_three(row, to, by_n, by_x, by_z)
+    return (
+        light + dot(n, by_n),
+        dot(n, by_x),
+        dot(n, by_z),
+        light + dot(x, by_x),
+        dot(x, by_z),
+        light + dot(z, by_z),
+    )
 
 
 @jitable
@@ -223,23 +246,25 @@ def fill_point(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
     """
     P, row = S.points, S.points.given[k]
     n, x = vector(P.normal[k]), vector(P.tangent[k])
-    z = cross(n, x)
-    for c in range(3):
-        row[AXES + c], row[AXES + 3 + c], row[AXES + 6 + c] = n[c], x[c], z[c]
-    put_side(scene, S, k, 0)
-    put_side(scene, S, k, 1)
+    axes = (n, x, cross(n, x))
+    put_three(row, AXES, axes[0], axes[1], axes[2])
+    i, j = put_side(S, k, 0, axes), put_side(S, k, 1, axes)
     if not widen(scene, S, k, begin):
         return False
-    row[W_NN], row[W_NX], row[W_NZ] = (
-        answer_of(P, k, 0, 0),
-        answer_of(P, k, 0, 1),
-        answer_of(P, k, 0, 2),
-    )
-    row[W_XX], row[W_XZ], row[W_ZZ] = (
-        answer_of(P, k, 1, 1),
-        answer_of(P, k, 1, 2),
-        answer_of(P, k, 2, 2),
-    )
+    if P.wide[k] < 0:
+        for c in range(6):
+            row[W_NN + c] = i[c] + j[c]
+    else:
+        row[W_NN], row[W_NX], row[W_NZ] = (
+            answer_of(P, k, 0, 0),
+            answer_of(P, k, 0, 1),
+            answer_of(P, k, 0, 2),
+        )
+        row[W_XX], row[W_XZ], row[W_ZZ] = (
+            answer_of(P, k, 1, 1),
+            answer_of(P, k, 1, 2),
+            answer_of(P, k, 2, 2),
+        )
     fill_inverse(row)
     P.closing[k] = velocity_of(P, k, 0, S.motion.before)
     return True
