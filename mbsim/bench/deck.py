@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from mbsim.bench.parameters import GRAVITY, SAMPLE
 
@@ -165,6 +165,13 @@ def coulomb(mu: float, vs: float) -> dict[str, object]:
         "stiction_trans_vel": vs,
         "friction_trans_vel": vs,
     }
+
+
+def fixed_step(variation: Mapping[str, float]) -> list[str]:
+    """Return the statement that fixes the step, where the variation has one (`h`, s)."""
+    if "h" not in variation:
+        return []
+    return [f"<Param_Transient {attributes(h_max=variation['h'], h_min=variation['h'])}/>"]
 
 
 def gravity(x: float = 0.0, z: float = -GRAVITY) -> str:

@@ -141,11 +141,6 @@ def compare(scene: Scene, rows: Sequence[Measurement]) -> list[Cell]:
     if held_to != scene.measure:
         same = front(points(candidates(scene, rows, ours=True), scene.measure))
         cells += [_cell(scene, p, same, scene.measure, None) for p in shown]
-    for run in scene.elsewhere:
-        known = Point(
-            run.error, run.wall_per_sim_s, run.engine, f"{run.setting} (reference machine)"
-        )
-        cells.append(_cell(scene, known, ours, held_to, None))
     return cells
 
 

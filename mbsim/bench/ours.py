@@ -57,11 +57,15 @@ class Setting(NamedTuple):
 def settings(
     scene: Scene, integrators: Sequence[str], tolerances: Sequence[float]
 ) -> list[Setting]:
-    """Return all settings of a scene; no `integrators` or `tolerances` means the scene's own."""
+    """Return all settings of a scene; no `integrators` or `tolerances` means the scene's own.
+
+    A variation with a step `h` is MOREAU's alone, which takes fixed steps.
+    """
     return [
         Setting(integrator, tol, variation)
         for variation in scene.variations
         for integrator in integrators or scene.integrators or able(scene.deck(variation))
+        if "h" not in variation or integrator == "MOREAU"
         for tol in (tolerances or scene.tolerances)
     ]
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from mbsim.bench.outcome import Outcome
 from mbsim.bench.parameters import SAMPLE
@@ -26,15 +25,6 @@ class Target:
 
     ratio: float
     up_to: float = float("inf")
-
-
-class Elsewhere(NamedTuple):
-    """A run that was measured on another machine, shown beside ours and never judged."""
-
-    engine: str
-    setting: str
-    error: float
-    wall_per_sim_s: float
 
 
 @dataclass(frozen=True)
@@ -67,8 +57,6 @@ class Scene:
         A further measure of our runs that belongs into the plot, dashed, and its label.
     pass_below
         Where set, runs are compared by the time of the fastest one with a smaller error.
-    elsewhere
-        Figures from another machine that are shown beside the comparison.
     integrators, tolerances
         Of our runs, tolerances from loose to tight; no `integrators` means all that can run it.
     sample
@@ -95,7 +83,6 @@ class Scene:
     variants: tuple[str, ...] = ("",)
     second: tuple[str, str] | None = None
     pass_below: float | None = None
-    elsewhere: tuple[Elsewhere, ...] = ()
     integrators: tuple[str, ...] = ()
     tolerances: tuple[float, ...] = TOLERANCES
     sample: float = SAMPLE
