@@ -99,7 +99,9 @@ def command(
     installed = [] if no_peers else peers.available()
     missing = [] if no_peers else [name for name in peers.ENGINES if name not in installed]
     if missing:
-        _say(f"not installed, so not compared: {', '.join(missing)}; mbsim-contact[bench] has them")
+        has = "mbsim-contact[bench] has them"
+        has += ", but for ode: a library and a C compiler" if "ode" in missing else ""
+        _say(f"not installed, so not compared: {', '.join(missing)}; {has}")
     chosen = runner.choose_scenes(scenes)
     methods = runner.choose_integrators(integrators)
     options = runner.Options(chosen, methods, tolerances, repeats, installed)

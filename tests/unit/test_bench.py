@@ -630,6 +630,7 @@ def test_missing_peers_are_named_in_one_line(tmp_path, monkeypatch):
     assert done.exit_code == 0
     (line,) = [line for line in done.stderr.splitlines() if "not installed" in line]
     assert "mujoco, exudyn, pybullet, drake, ode" in line
+    assert line.endswith("mbsim-contact[bench] has them, but for ode: a library and a C compiler")
 
 
 def test_a_machine_without_peers(tmp_path, monkeypatch):
