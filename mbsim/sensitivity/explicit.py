@@ -77,9 +77,12 @@ def explicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k:
 
 
 @jitable
-def fit_beside(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
-    """Fill the polynomials of the run's step, and of its derivative k; return a code."""
-    twin, e = view(V.words[TWIN], Scene), half_step(V, k)
+def fit_beside(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int, e: float) -> int:
+    """Fill the polynomials of the run's step, and of its derivative k; return a code.
+
+    `e` is by how much the parameter was changed in the step on either side, which was just taken.
+    """
+    twin = view(V.words[TWIN], Scene)
     for side in range(2):
         set_parameter(V, twin, scene, k, e if side == 0 else -e)
         own = in_workspace(V.words[UP + side])[1]

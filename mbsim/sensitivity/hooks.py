@@ -97,10 +97,13 @@ def lose(V: Variations, k: int, t: float, why: int) -> None:
 
 
 @jitable
-def fit(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
-    """Fill the polynomials of the run's step, and of derivative k of an explicit one."""
+def fit(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int, e: float) -> int:
+    """Fill the polynomials of the run's step, and of derivative k of an explicit one.
+
+    `e` is by how much the parameter was changed in the step.
+    """
     if V.words[ATTEMPT] != 0:
-        return fit_beside(V, scene, m, t, h, k)
+        return fit_beside(V, scene, m, t, h, k, e)
     if V.words[ALONG] == 1:
         fit_hermite(V, m, h)
         return 0
@@ -148,7 +151,8 @@ def carry(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) ->
     V.bends[k] = 1 if bends else 0
     V.words[BENT] += V.bends[k]
     if bends or (m.memory[SHOWN] == 1.0 and V.words[ATTEMPT] != 0):
-        code = fit(V, scene, m, t, h, k)
+        # with the step of the differences that were taken: `reach` is the next one's
+        code = fit(V, scene, m, t, h, k, e)
     if code != 0 or not bends:
         return code
     if V.words[ORDERED] == 0:

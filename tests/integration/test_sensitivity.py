@@ -60,6 +60,23 @@ BOX = """<Body_Rigid id="{id}" cg_id="{id}0" mass="1" inertia_xx="0.01" inertia_
  cff_type="STICTION" mu_static="{mu}" mu_dynamic="{mu}" tangential_stiffness="1e6"/>
 """
 
+THROWN = """<Deck><Model>
+<Body_Rigid id="1" isground="TRUE"/>
+<Body_Rigid id="2" cg_id="20" mass="5" inertia_xx="0.0233" inertia_yy="0.0233" inertia_zz="0.0233"
+ v_ic_x="5" v_ic_x_flag="TRUE"/>
+<Reference_Marker id="10" body_id="1"/>
+<Reference_Marker id="20" body_id="2" pos_z="0.118"/>
+<Post_Graphic id="100" type="Plane" rm_id="10"/>
+<Post_Graphic id="200" type="Sphere" center_marker_id="20" radius="0.108"/>
+<Force_Contact id="301" num_i_graphics="1" i_graphics_id="200" num_j_graphics="1"
+ j_graphics_id="100" cnf_type="IMPACT" stiffness="3e6" exponent="1.5" damping="200" dmax="1e-4"
+ cff_type="COULOMB_ON" mu_static="0.3" mu_dynamic="0.3" stiction_trans_vel="0.02"
+ friction_trans_vel="0.02"/>
+<Force_Gravity grav_z="-9.81"/>
+</Model><Command>
+<Simulate analysis_type="Transient" end_time="0.2" print_interval="0.001"/>
+</Command></Deck>"""
+
 TWO_BOXES = """<Deck><Model><Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10"
  body_id="1"/><Post_Graphic id="100" type="Plane" rm_id="10"/>{}
 <Force_Gravity grav_z="-10"/></Model><Command>
@@ -140,6 +157,16 @@ def test_ten_impacts(integrator):
     assert np.count_nonzero(run["events"]["kind"] == "touch") == 10
     assert np.abs(found - sure)[flies].max() < 5e-4 * np.abs(sure)[flies].max()
     assert np.abs(found - sure)[flies & (run["time"] < 1.3)].max() < 1e-4 * 11.0
+
+
+@pytest.mark.parametrize("integrator", ["AUTO", "DOPRI5", "DOP853", "RADAU5"])
+def test_rows_within_steps_just_behind_an_impact(integrator):
+    # friction takes mu times the impulse of the normal force, which knows nothing of it
+    name = "Force_Contact[301].mu_dynamic"
+    run = mbsim.simulate(THROWN, integrator=integrator, tol=1e-8, sensitivity=[name])
+    assert np.count_nonzero(run["events"]["kind"] == "leave") == 2
+    truth = (run["bodies/2/velocity/x"] - 5.0) / 0.3
+    assert off(run.sensitivity("bodies/2/velocity/x", name), truth) < 1e-6
 
 
 @pytest.mark.parametrize(
