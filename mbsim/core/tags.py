@@ -119,6 +119,12 @@ def arrays(whole: Any, tag: Tag, path: str = "") -> Iterator[tuple[str, Array]]:
             yield path + name, field
 
 
+def at_path(whole: Any, path: str) -> Array:
+    """Return the array at a path of `arrays`, in a group or a group of groups."""
+    found: Array = functools.reduce(getattr, path.split("/"), whole)
+    return found
+
+
 def copies(whole: Any, tag: Tag, path: str = "") -> dict[str, Array]:
     """Return copies of all arrays with a tag, by path."""
     return {name: np.array(array) for name, array in arrays(whole, tag, path)}

@@ -57,6 +57,7 @@ from mbsim.integrators.scheme import Method, in_workspace
 from mbsim.laws.catalog import UNDECIDED
 from mbsim.sensitivity.arrays import (
     ALIKE,
+    APART,
     ASKED,
     BEFORE,
     CHANGES,
@@ -168,11 +169,12 @@ def clear_slope(
     e: float,
 ) -> int:
     """Write D' at a part of the step, within begin and end, into a row of `work`; return a code."""
-    w, off, width, step = V.work, NEAREST, end - begin, e
+    w, off, width, step = V.work, V.line[APART], end - begin, e
     while True:
         s = min(max(asked, begin + off * width), end - off * width)
         code = slope_at(V, scene, t, h, k, s, w[STAGE], step, w[row])
         if code != 0 or V.words[ALIKE] == V.words[ALIKE + 1]:
+            V.line[APART] = off
             return code
         if off >= 0.5:
             # a stretch so short that a smaller difference, which is less exact, matters little
@@ -192,14 +194,15 @@ def try_part(
     span: Span,
     s: float,
     e: float,
+    begun: bool,
 ) -> tuple[int, float]:
     """Try a part of the step from s on; return a code, and the error over the derivative's size.
 
-    What it leads to is left in `work`.
+    What it leads to is left in `work`; where the part has begun its first slope is there already.
     """
     w, d = V.work, V.next[k]
     part, error, whole = span[3], 0.0, 1.0 / V.size[k]
-    for stage in range(7):
+    for stage in range(1 if begun else 0, 7):
         for i in range(len(d)):
             rise = 0.0
             for j in range(stage):
@@ -234,7 +237,8 @@ def integrate(
     the steps get short.
     """
     w, d, s, part, most = V.work, V.next[k], begin, end - begin, V.enough[0]
-    tries, before = 0, begin
+    tries, before, begun = 0, begin, False
+    V.line[APART] = NEAREST
     while s < end:
         tries += 1
         if is_too_much(V):
@@ -248,13 +252,14 @@ def integrate(
             before = s
         last = s + 1.0001 * part >= end
         part = end - s if last else part
-        code, error = try_part(V, scene, t, h, k, (begin, end, part, part * h), s, e)
+        code, error = try_part(V, scene, t, h, k, (begin, end, part, part * h), s, e, begun)
         if code != 0:
             return code
+        begun = True
         shortest = part <= SHORTEST or part * h <= 1e-15 * abs(t)
         if error <= most or shortest:
             for i in range(len(d)):
-                d[i] = w[STAGE, i]
+                d[i], w[FIRST, i] = w[STAGE, i], w[FIRST + 6, i]
             s = end if last else s + part
         part *= min(4.0, max(0.1, 0.9 * (most / max(error, 1e-12)) ** 0.2))
     return 0

@@ -36,6 +36,11 @@ SET = 24
 WORDS = 25
 #: Rows of `Variations.jump`: y before the commit, f before and behind it.
 BEFORE, F_BEFORE, F_BEHIND = range(3)
+#: Number of `Variations.line`: how far from the ends of a stretch of a step both sides of a
+#: difference touch alike, over its length.
+APART = 1
+#: Number of `Variations.enough`: what an iteration may leave, over the derivative.
+LEFT = 1
 #: Contacts that may begin or end within one step.
 MOST_CHANGES = 16
 
@@ -58,15 +63,17 @@ class Variations(NamedTuple):
     path: tags.Scratch[F2]  # (coefficients, n) polynomial of the run's step
     work: tags.Scratch[F2]  # (WORK, n) of `along`
     error: tags.Scratch[F1]  # (P,) of the last step, over the derivative
-    enough: tags.Constant[F1]  # (1,) how large that may be
-    bends: tags.Scratch[I1]  # (P,) 1 where the last step was taken along the motion
+    enough: tags.Constant[F1]  # (2,) how large that may be; LEFT
+    rate: F1  # (P,) how much smaller corrections of an implicit method's stages got, one by one
+    bends: I1  # (P,) 1 where the last step was taken along the motion
     jump: tags.Scratch[F2]  # (3, n) see BEFORE
     middle: tags.Scratch[F3]  # (P, ns, most) mean of both sides behind a change of branch
     mode: tags.Scratch[F1]  # (ns,) `State.mode` before it
     reach: F1  # (P,) by how much a parameter may be changed for depths, 0: not known
     odd: tags.Scratch[I2]  # (2, ns) 1 where friction asks for another branch beside the run
     depth: tags.Scratch[F2]  # (2, ns) how deep slots are at the end of a step on either side
-    line: tags.Scratch[F1]  # (1,) length of the straight line [T]
+    # (2,) length of the straight line [T]; APART
+    line: tags.Scratch[F1]
     # (P, ns + 1) by how much slots change their branch later, by the parameter; what else does last
     shift: tags.Scratch[F2]
     asks: tags.Scratch[I1]  # (ns + 1,) slots that ask for another branch, their number last
@@ -78,11 +85,14 @@ class Variations(NamedTuple):
     scale: tags.Constant[F1]  # (n,) usual size of a number of y
     room: tags.Constant[F1]  # (n,) by how much it may be changed for a difference
     weights: tags.Constant[F1]  # of an explicit method's stages; none where joints hold bodies
+    estimates: tags.Constant[F2]  # (1 or 2, stages) of its errors, up to the one at the step's end
+    slope: F2  # (P, n) D' of an explicit method's last stage
+    smooth: I1  # (P,) 1 where that is D' at the committed point
     size: tags.Constant[F1]  # (P,) of a parameter
     first: tags.Constant[I1]  # (P + 1,) first of the numbers that a parameter changes
     place: tags.Constant[I1]  # where each of these is
     base: tags.Constant[F1]  # what it is
-    slope: tags.Constant[F1]  # its derivative
+    rise: tags.Constant[F1]  # its derivative
     step: tags.Scratch[F2]  # (rows, P) by how much a parameter is changed for a row of results
 
 

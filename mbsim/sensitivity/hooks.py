@@ -155,6 +155,7 @@ def carry(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) ->
         code = fit(V, scene, m, t, h, k, e)
     if code != 0 or not bends:
         return code
+    V.smooth[k] = 0
     if V.words[ORDERED] == 0:
         V.words[ORDERED] = 1
         if not order_changes(V, scene, t, h):
@@ -233,7 +234,10 @@ def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int
         for k in range(len(V.size)):
             if V.reason[k] != 0.0:
                 lose(V, k, t, int(V.reason[k]))
+    anew = word & (Taken.Y_CHANGED + Taken.BEGIN_ANEW) != 0
     for k in range(len(V.size)):
+        if switched or anew:
+            V.smooth[k] = 0
         for s in range(V.memory.shape[1]):
             for j in range(V.memory.shape[2]):
                 V.before[k, s, j], V.memory[k, s, j] = V.memory[k, s, j], V.end[k, s, j]

@@ -21,7 +21,7 @@ from mbsim.integrators.radau5 import G0, G_IM, G_RE, TI, C, T
 from mbsim.integrators.radau5 import E as ERROR
 from mbsim.integrators.radau5 import Z as STAGES_AT
 from mbsim.integrators.scheme import FRESH, LAST_STEP, Method, in_workspace
-from mbsim.sensitivity.arrays import JOINTS, REMEMBERED, TWIN, UP, Variations
+from mbsim.sensitivity.arrays import JOINTS, LEFT, REMEMBERED, TWIN, UP, Variations
 from mbsim.sensitivity.twin import (
     half_step,
     keep_change,
@@ -37,19 +37,28 @@ Z, F, REAL, REAL_D, PAIR, PAIR_D, POINT, SLOPE = 0, 3, 6, 7, 8, 10, 12, 13
 STAGES = 14
 #: By how much the error of order 3 overrates that of the step.
 OVERRATED = 100.0
-#: The iteration ends at a correction of this part of the derivative; it fails after so many, and
-#: where one is more than SLOW of that before: the linearisation is that of other forces.
-ENOUGH, MOST, SLOW = 1e-10, 12, 0.5
+#: The iteration fails after so many, and where a correction is more than SLOW of that before: the
+#: linearisation is that of other forces.
+MOST, SLOW = 12, 0.5
+#: How fast corrections get smaller is trusted less from step to step while one is all there is
+#: (Hairer and Wanner, section IV.8).
+FORGET, LEAST_RATE = 0.8, 1e-6
 #: Corrections that get no smaller are rounding where they are less than so much of y in sides of a
 #: difference.
 ROUNDING = 4e-15
 
 
 @jitable
+def goes_on(m: Method, h: float) -> bool:
+    """Return whether the last step's polynomials say something of a step h from its end."""
+    return m.memory[FRESH] == 0.0 and m.memory[LAST_STEP] > 0.0 and h < 10.0 * m.memory[LAST_STEP]
+
+
+@jitable
 def extrapolate(V: Variations, m: Method, h: float, k: int) -> None:
     """Begin with stages where the last step's polynomial, carried on, has them."""
     z, d = V.stage[Z : Z + 3], V.dense[k]
-    known = m.memory[FRESH] == 0.0 and m.memory[LAST_STEP] > 0.0 and h < 10.0 * m.memory[LAST_STEP]
+    known = goes_on(m, h)
     for j in range(3):
         s = 1.0 + C[j] * h / m.memory[LAST_STEP] if known else 0.0
         for i in range(len(m.y)):
@@ -169,6 +178,7 @@ def implicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k:
     before, largest = math.inf, 1.0
     for i in range(len(m.y)):
         largest = max(largest, abs(m.y[i]) / V.scale[i])
+    rate = V.rate[k] ** FORGET
     for iteration in range(MOST):
         code = evaluate_stages(V, scene, m, t, h, k, e)
         if code != 0:
@@ -182,7 +192,9 @@ def implicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k:
             return code
         if not size < math.inf:
             return Code.NOT_CONVERGED
-        if size <= ENOUGH * whole:
+        if iteration > 0:
+            rate = min(size / before, 0.99) if before > 0.0 else 0.0
+        if rate / (1.0 - rate) * size <= V.enough[LEFT] * whole:
             break
         slow = size > SLOW * before
         if slow and size <= ROUNDING / e * largest:
@@ -190,8 +202,9 @@ def implicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k:
         if slow or iteration + 1 == MOST:
             return Code.NOT_CONVERGED
         before = size
-    keep_polynomial(V, m, k)
+    V.rate[k] = max(rate, LEAST_RATE)
     code = estimate_error(V, scene, m, t, h, k, e)
+    keep_polynomial(V, m, k)
     if code != 0:
         return code
     if V.words[REMEMBERED] > 0:
@@ -213,23 +226,29 @@ def estimate_error(
         r[i] = 0.0
         for j in range(3):
             r[i] += ERROR[j] * V.stage[Z + j, i] / h
-    for side in range(2):
-        sign = 1.0 if side == 0 else -1.0
-        set_parameter(V, twin, scene, k, sign * e)
+    if goes_on(m, h) and V.bends[k] == 0:
+        # the last stage is the end of the step before
         for i in range(len(m.y)):
-            x[i] = m.y[i] + sign * e * V.d[k, i]
-        code = call_int(p.rhs, (p.context, t, 0.0, x, f))
-        if code != 0:
-            return code
-        for i in range(len(m.y)):
-            r[i] += sign * 0.5 / e * f[i]
+            r[i] += (V.dense[k, 1, i] - V.dense[k, 2, i] - V.dense[k, 3, i]) / m.memory[LAST_STEP]
+    else:
+        for side in range(2):
+            sign = 1.0 if side == 0 else -1.0
+            set_parameter(V, twin, scene, k, sign * e)
+            for i in range(len(m.y)):
+                x[i] = m.y[i] + sign * e * V.d[k, i]
+            code = call_int(p.rhs, (p.context, t, 0.0, x, f))
+            if code != 0:
+                return code
+            for i in range(len(m.y)):
+                r[i] += sign * 0.5 / e * f[i]
     if V.words[JOINTS] == 1:
         put_along(p, m, t, m.y, r, x)
     code = call_int(p.solve, (p.context, t, h, r, V.stage[REAL_D]))
     error, whole = 0.0, 1.0 / V.size[k]
     for i in range(len(m.y)):
+        end = V.d[k, i] + V.stage[Z + 2, i]
         error = max(error, abs(V.stage[REAL_D, i]) / V.scale[i])
-        whole = max(whole, abs(V.next[k, i]) / V.scale[i], abs(V.d[k, i]) / V.scale[i])
+        whole = max(whole, abs(end) / V.scale[i], abs(V.d[k, i]) / V.scale[i])
     V.error[k] = error / whole / OVERRATED
     return code
 

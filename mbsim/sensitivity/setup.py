@@ -36,6 +36,9 @@ Array = np.ndarray[Any, Any]
 _OWN_STATE = ("log/", "audit/", "rows/", "state/memory", "state/before", "state/chattering")
 #: The error of a step of a derivative may be this part of it, or so many tol.
 ENOUGH, ENOUGH_TOL = 1e-9, 10.0
+#: What an iteration may leave, over the error of a step; of a derivative, where friction remembers:
+#: when it sticks and slips follows from depths, which are far smaller than the model.
+LEFT, LEFT_OF_MEMORY = 0.01, 1e-13
 #: What is no signal of the motion.
 _NO_SIGNALS = ("time", "state/", "contact_points/", "events")
 _WHY = {
@@ -108,18 +111,15 @@ class Sensitivities:
         """Return the derivative of y at the start."""
         scene, found = self.twin.scene, []
         state = tags.copies(scene, tags.STATE)
-        own = {name: array.copy() for name, array in _by_path(scene) if name in direction.arrays}
+        own = {name: tags.at_path(scene, name).copy() for name in direction.arrays}
         for system in direction.systems:
-            changed = dict(_by_path(system.scene))
-            for name, array in _by_path(scene):
-                if name in direction.arrays:
-                    array[...] = changed[name]
+            for name in own:
+                tags.at_path(scene, name)[...] = tags.at_path(system.scene, name)
             y = system.y0.copy()
             assemble(self.twin, system, problem, y)
             found.append(y)
-        for name, array in _by_path(scene):
-            if name in own:
-                array[...] = own[name]
+        for name, array in own.items():
+            tags.at_path(scene, name)[...] = array
         tags.put_back(scene, tags.STATE, state)
         return weighed(found, direction.change)
 
@@ -128,16 +128,15 @@ class Sensitivities:
         scene, n, count = self.system.scene, len(y), len(self.directions)
         shape = scene.state.memory.shape
         place, base, slope, first = [], [], [], [0]
-        by_path = dict(_by_path(self.twin.scene))
         for direction in self.directions:
             for name, table in direction.arrays.items():
-                own = by_path[name]
+                own = tags.at_path(self.twin.scene, name)
                 for k in np.flatnonzero(table):
                     place.append(own.ctypes.data + 8 * int(k))
                     base.append(float(own.ravel()[k]))
                     slope.append(float(table.ravel()[k]))
             first.append(len(place))
-        rows = len(scene.rows.time)
+        rows, enough = len(scene.rows.time), max(ENOUGH, ENOUGH_TOL * tol)
         return Variations(
             words=np.zeros(at.WORDS, dtype=np.int64),
             d=start.reshape(count, n).copy(),
@@ -152,7 +151,8 @@ class Sensitivities:
             path=np.zeros((0, n)),
             work=np.zeros((WORK, n)),
             error=np.zeros(count),
-            enough=np.full(1, max(ENOUGH, ENOUGH_TOL * tol)),
+            enough=np.array((enough, LEFT_OF_MEMORY if shape[1] else LEFT * enough)),
+            rate=np.full(count, 0.99),
             bends=np.zeros(count, dtype=np.int64),
             jump=np.zeros((3, n)),
             end=np.zeros((count, *shape)),
@@ -161,7 +161,7 @@ class Sensitivities:
             reach=np.zeros(count),
             depth=np.zeros((2, shape[0])),
             odd=np.zeros((2, shape[0]), dtype=np.int64),
-            line=np.zeros(1),
+            line=np.zeros(2),
             shift=np.zeros((count, shape[0] + 1)),
             asks=np.zeros(shape[0] + 1, dtype=np.int64),
             reason=np.zeros(count),
@@ -172,11 +172,14 @@ class Sensitivities:
             scale=_scale(self.system, n),
             room=_scale(self.system, n) * _steps(self.system, n),
             weights=np.zeros(0),
+            estimates=np.zeros((1, 0)),
+            slope=np.zeros((count, n)),
+            smooth=np.zeros(count, dtype=np.int64),
             size=np.array([direction.size for direction in self.directions]),
             first=np.array(first, dtype=np.int64),
             place=np.array(place, dtype=np.int64),
             base=np.array(base),
-            slope=np.array(slope),
+            rise=np.array(slope),
             step=np.zeros((rows, count)),
         )
 
@@ -219,7 +222,9 @@ class Sensitivities:
         words[at.FITTED] = 0
         joints = words[at.JOINTS] == 1
         self.arrays = self.arrays._replace(
-            weights=np.zeros(0) if joints or running.implicit else _weights(running)
+            weights=np.zeros(0) if joints or running.implicit else _weights(running),
+            estimates=np.zeros((1, 0)) if running.implicit else _estimates(running),
+            smooth=np.zeros(len(self.directions), dtype=np.int64),
         )
         if self.arrays.dense.shape[1] != running.dense:
             self.arrays = self.arrays._replace(
@@ -311,11 +316,6 @@ def _part(block: Block, rows: slice) -> Block:
     return Block(**{name: table[rows] for name, table in fields.items()} | without)
 
 
-def _by_path(scene: Any) -> list[tuple[str, Array]]:
-    """Return all arrays of a scene by path."""
-    return [pair for tag in tags.Tag for pair in tags.arrays(scene, tag)]
-
-
 def _steps(system: System, n: int) -> Array:
     """Return half of the step of a difference in usual sizes of every number of y."""
     found = np.full(n, STEP)
@@ -348,3 +348,15 @@ def _scale(system: System, n: int) -> Array:
     for s in np.flatnonzero(places >= 0):
         found[places[s] : places[s] + 2] = length
     return found
+
+
+def _estimates(running: scheme.Scheme) -> Array:
+    """Return by what weights an explicit method adds up its stages to errors."""
+    from mbsim.integrators import dop853, dopri5
+
+    if running is dop853.SCHEME:
+        found = np.zeros((2, 13))
+        found[0, :12], found[1, :12] = dop853.E5[0], dop853.E3[0]
+        return found
+    five = dopri5
+    return np.array(((five.E1, 0.0, five.E3, five.E4, five.E5, five.E6, five.E7),))

@@ -61,7 +61,7 @@ def set_parameter(V: Variations, twin: Scene, scene: Scene, k: int, e: float) ->
             floats_at(V.place[j], 1)[0] = V.base[j]
         V.words[SET] = k
     for j in range(V.first[k], V.first[k + 1]):
-        floats_at(V.place[j], 1)[0] = V.base[j] + e * V.slope[j]
+        floats_at(V.place[j], 1)[0] = V.base[j] + e * V.rise[j]
     if V.words[REMEMBERED] > 0:
         state, own = scene.state, twin.state
         for s in range(state.memory.shape[0]):

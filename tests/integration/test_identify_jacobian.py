@@ -11,7 +11,7 @@ from helpers.measured import BELT, curve, noisy, text_of, write_record
 from mbsim.errors import ModelError
 from mbsim.studies.columns import Columns
 from mbsim.studies.identify import identify
-from mbsim.studies.problem import WORTH, read_problem
+from mbsim.studies.problem import read_problem
 from mbsim.studies.rounds import Rounds
 from mbsim.studies.study import Case
 from mbsim.studies.worker import Here, run_one
@@ -163,7 +163,9 @@ def test_sensitivities_that_end_before_the_record_are_not_taken(tmp_path):
     assert np.abs(after - checked.columns).max() < 2e-2 * np.abs(after).max(), checked.sources
 
 
-def test_auto_takes_differences_where_sensitivities_are_more_work(tmp_path):
+def test_auto_takes_differences_where_sensitivities_are_more_work(tmp_path, monkeypatch):
+    worth = 1
+    monkeypatch.setattr("mbsim.studies.problem.WORTH", worth)
     t, x = curve(BELT, {}, 4.0, 0.05)
     y, sd = noisy(x, 4)
     write_record(tmp_path / "x.csv", t, y)
@@ -176,9 +178,9 @@ def test_auto_takes_differences_where_sensitivities_are_more_work(tmp_path):
     assert "it takes far more evaluations than the run itself" in checked.sources[0]
     # that was found out for little
     derived = problem.study.set_by("mu_static")
-    row = run_one(problem.study, Case(0, {"mu_static": 0.99}, derived, WORTH))
+    row = run_one(problem.study, Case(0, {"mu_static": 0.99}, derived, worth))
     took = row.slopes[derived[0]]["evaluations"]
-    assert row.evaluations < took < (WORTH + 1) * (row.evaluations + 200)
+    assert row.evaluations < took < (worth + 1) * (row.evaluations + 200)
     assert np.abs(after - checked.columns).max() <= 1e-12 * np.abs(after).max()
 
 
