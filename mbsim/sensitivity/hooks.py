@@ -183,6 +183,9 @@ def take_step(V: Variations, scene: Scene, m: Method, t: float, h: float) -> Non
     for k in range(len(V.size)):
         if V.lost[k] < math.inf:
             continue
+        if is_too_much(V):
+            lose(V, k, t, LOST_WORK)
+            continue
         V.words[ODD] = 0
         if not listed or carry(V, scene, m, t, h, k) != 0:
             lose(V, k, t, LOST_WORK if is_too_much(V) else LOST_FAILED)

@@ -180,7 +180,7 @@ def test_auto_takes_differences_where_sensitivities_are_more_work(tmp_path, monk
     derived = problem.study.set_by("mu_static")
     row = run_one(problem.study, Case(0, {"mu_static": 0.99}, derived, worth))
     took = row.slopes[derived[0]]["evaluations"]
-    assert row.evaluations < took < (worth + 1) * (row.evaluations + 200)
+    assert 0 < took < row.evaluations
     assert np.abs(after - checked.columns).max() <= 1e-12 * np.abs(after).max()
 
 
