@@ -86,11 +86,12 @@ CONTACT = ("S1", "S2a", "S3", "S4stick", "S4slip", "S5", "S7_125", "S10a", "S10c
 BOXES = ("S6", "S10b", "bin_50", "bin_200")
 MESHES = ("S9plane",)
 JOINTS = ("S8_2", "S8_10", "S8_40", "S8b")
+DAILY = ("quadruped",)
 SCENES_OF = {
-    "mujoco": CONTACT + JOINTS + MESHES + BOXES,
+    "mujoco": CONTACT + JOINTS + MESHES + BOXES + DAILY,
     "exudyn": CONTACT + JOINTS,
     "pybullet": CONTACT + MESHES,
-    "drake": (*JOINTS, *MESHES, "S9torus"),
+    "drake": (*JOINTS, *MESHES, "S9torus", "quadruped"),
     "ode": ("S3", "S4stick", "S4slip", "S7_125", "S7_1000", "S9plane", "S9torus", *BOXES),
 }
 
@@ -119,8 +120,8 @@ def test_exudyn_has_steps_short_enough_for_the_rows_in_every_scene():
     for name, scene in all_scenes().items():
         cases = [make() for make in exudyn_scenes.cases(name).values()]
         if not cases:
-            # meshes, the stiff decks, boxes on boxes: it does not have them
-            assert name.startswith(("S9", "S11_")) or name in BOXES
+            # meshes, the stiff decks, boxes on boxes, scenes of daily work: it does not have them
+            assert name.startswith(("S9", "S11_")) or name in BOXES + DAILY
             continue
         assert any(case.solver.step <= scene.sample for case in cases)
         assert all(case.sample == scene.sample for case in cases)

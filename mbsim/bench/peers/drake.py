@@ -1,7 +1,7 @@
 """Drake: joints in minimal coordinates, continuous with Runge-Kutta steps, or discrete.
 
-Only S8_n, S8b and S9, by hydroelastic contact: its contact laws are held against the other scenes'
-nowhere else. A loop can be closed in discrete time only.
+Only S8_n, S8b, S9 by hydroelastic contact, and `quadruped` by compliant points: its contact laws
+are held against the other scenes' nowhere else. A loop can be closed in discrete time only.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from mbsim.bench import linkages
 from mbsim.bench import parameters as p
 from mbsim.bench.outcome import Outcome
-from mbsim.bench.peers import common, drake_tori
+from mbsim.bench.peers import common, drake_quadruped, drake_tori
 
 NAME = "drake"
 
@@ -74,6 +74,8 @@ def version() -> str:
 
 def settings(scene: str) -> list[str]:
     """Settings of one scene, coarse to fine; empty if the scene is not known."""
+    if scene == "quadruped":
+        return list(drake_quadruped.settings())
     return list(drake_tori.settings() if scene in _TORI else _cases(scene))
 
 
@@ -82,6 +84,9 @@ def run(scene: str, setting: str, repeats: int) -> Outcome:
     if scene in _TORI:
         with common.silence():
             return drake_tori.run(_engine(), _TORI[scene], drake_tori.settings()[setting], repeats)
+    if scene == "quadruped":
+        with common.silence():
+            return drake_quadruped.run(_engine(), *drake_quadruped.settings()[setting], repeats)
     case = _cases(scene)[setting]()
     with common.silence():
         return _run(case, repeats)

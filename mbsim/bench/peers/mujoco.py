@@ -21,11 +21,9 @@ from mbsim.bench.outcome import Outcome
 from mbsim.bench.peers import common
 from mbsim.bench.peers import mujoco_boxes as boxes
 from mbsim.bench.peers import mujoco_linkages as jointed
+from mbsim.bench.peers import mujoco_quadruped as walker
 from mbsim.bench.peers.laws import Law, hertz, hunt_crossley, impact, linear, stiff
-from mbsim.bench.peers.mujoco_laws import (
-    Case,
-    callback,
-)
+from mbsim.bench.peers.mujoco_laws import Case, callback
 
 NAME = "mujoco"
 
@@ -60,8 +58,9 @@ def _run(case: Case, repeats: int) -> Outcome:
     model = mujoco.MjModel.from_xml_string(case.xml)
     data = mujoco.MjData(model)
     steps = common.plan(case.dt, case.end_time, case.sample)
-    rollout = steps.steps_per_row == 1 and case.law is None and case.cap == float("inf")
-    march = _rollout if rollout else _march
+    one_a_row = steps.steps_per_row == 1 and case.law is None and case.cap == float("inf")
+    rollout = one_a_row or case.control is not None
+    march = functools.partial(_rollout, control=case.control) if rollout else _march
     height = _rest_height(model, data) if case.settle else None
 
     def once() -> tuple[float, Any]:
@@ -119,20 +118,28 @@ def _march(model: Any, data: Any, steps: common.Plan, cap: float) -> tuple[float
     return wall, (qpos[: done + 1], qvel[: done + 1])
 
 
-def _rollout(model: Any, data: Any, steps: common.Plan, cap: float) -> tuple[float, Any]:
-    """Rows by the ``rollout`` module, which stores every step without Python between."""
+def _rollout(
+    model: Any, data: Any, steps: common.Plan, cap: float, control: Any = None
+) -> tuple[float, Any]:
+    """Rows by the ``rollout`` module, which stores every step without Python between.
+
+    `control` is read in the middle of each step.
+    """
     from mujoco import rollout
 
-    del cap  # only short scenes have a row a step
+    del cap  # only short scenes have a row a step or drives
     mujoco = _engine()
     spec = mujoco.mjtState.mjSTATE_FULLPHYSICS
     state = np.empty(mujoco.mj_stateSize(model, spec))
     mujoco.mj_getState(model, data, state, spec)
+    count = steps.rows * steps.steps_per_row
+    driven = None if control is None else control((np.arange(count) + 0.5) * steps.dt)[None]
     with rollout.Rollout(nthread=0) as roll:
         start = time.perf_counter()
-        stored, _ = roll.rollout(model, data, state, nstep=steps.rows)
+        stored, _ = roll.rollout(model, data, state, driven, nstep=count)
         wall = time.perf_counter() - start
-    states = np.vstack([state, stored[0]])[:, 1:]  # column 0 is the time
+    every = steps.steps_per_row
+    states = np.vstack([state, stored[0][every - 1 :: every]])[:, 1:]  # column 0 is the time
     return wall, (states[:, : model.nq], states[:, model.nq : model.nq + model.nv])
 
 
@@ -172,6 +179,7 @@ def _cases(scene: str) -> dict[str, Callable[[], Case]]:
         "S10c": lambda: _free(p.S10C),
         "bin_50": lambda: boxes.bin_of(50),
         "bin_200": lambda: boxes.bin_of(200),
+        "quadruped": walker.quadruped,
     }
     return dict(scenes[scene]()) if scene in scenes else {}
 

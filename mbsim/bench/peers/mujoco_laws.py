@@ -33,6 +33,7 @@ class Case(NamedTuple):
     settle: bool = False  # start at the rest that gravity's part along z leads to
     position: np.ndarray | None = None  # qpos at the start, where it is not the model's own
     rows: RowsOf | None = None  # from times, qpos and qvel; None: free bodies
+    control: Callable[[np.ndarray], np.ndarray] | None = None  # of times (n,), (n, drives)
 
 
 def callback(case: Case, data: Any) -> Any:

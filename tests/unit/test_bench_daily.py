@@ -1,0 +1,92 @@
+"""Scenes of daily work: their decks, their errors, and what peers come to."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mbsim.bench import converged, peers
+from mbsim.bench import quadruped as walking
+from mbsim.bench.outcome import Outcome
+from mbsim.bench.scenes import all_scenes, s13_quadruped
+from mbsim.model.frames import marker_frames
+from mbsim.reader.xml import read_model
+
+
+def read(tmp_path, name, variation=None):
+    path = tmp_path / "deck.xml"
+    path.write_text(all_scenes()[name].deck(variation or {}), encoding="utf-8")
+    return read_model(path)
+
+
+def outcome(position, end_time):
+    """Return rows of bodies (n, bodies, 3) that neither turn nor move."""
+    n, bodies = position.shape[:2]
+    upright = np.tile([1.0, 0.0, 0.0, 0.0], (n, bodies, 1))
+    still = np.zeros_like(position)
+    return Outcome(0.1, np.linspace(0.0, end_time, n), position, upright, still, still, {}, "")
+
+
+def run(engine, scene, setting):
+    if engine not in peers.available():
+        pytest.skip(f"{engine} is not installed")
+    return peers.load(engine).run(scene, setting, repeats=0)
+
+
+# --- quadruped
+
+
+def test_the_walker_is_put_together_and_stands_above_the_floor(tmp_path):
+    model = read(tmp_path, "quadruped")
+    assert model.warnings == ()
+    frames = marker_frames(model)
+    for number in range(3, 15):
+        mine, other = frames[10 * number + 1], frames[1000 + 10 * number + 2]
+        assert mine.p == pytest.approx(other.p, abs=1e-15)
+        assert pytest.approx(other.R, abs=1e-15) == mine.R
+        axis = (1.0, 0.0, 0.0) if number % 3 == 0 else (0.0, 1.0, 0.0)
+        assert mine.R[:, 2] == pytest.approx(axis)
+    w = walking.WALKER
+    for number in (5, 8, 11, 14):
+        foot, hip = frames[10 * number + 3].p, frames[10 * (number - 1) + 1].p
+        assert foot[:2] == pytest.approx(hip[:2], abs=1e-15)
+        assert w.foot < foot[2] < w.foot + 0.01  # it falls less than a centimetre
+    assert len(walking.legs()) == 12
+    assert walking.targets(np.array([0.0, np.pi / 2.0 / w.rate]))[1, :3] == pytest.approx(
+        [0.0, 0.2, -0.4]
+    )
+
+
+def test_the_walker_is_held_to_its_converged_path(monkeypatch):
+    exact = np.zeros((201, 3))
+    monkeypatch.setattr(converged, "path", lambda *_, **__: exact)
+    place = np.zeros((201, 1, 3))
+    place[100, 0] = [3e-3, 0.0, 4e-3]
+    place[-1, 0, 0] = 1e-3
+    errors = all_scenes()["quadruped"].errors(outcome(place, 2.0), "")
+    assert errors == pytest.approx({"path_max": 5e-3, "path_end": 1e-3})
+    # rows that are further apart are compared where they are
+    assert all_scenes()["quadruped"].errors(outcome(place[::2], 2.0), "")["path_max"] == 5e-3
+
+
+@pytest.mark.parametrize(
+    ("engine", "setting", "bound"),
+    [
+        ("drake", "sap dt=0.002", 5e-3),
+        ("drake", "sap dt=0.0005", 2e-3),
+        ("mujoco", "Euler elliptic default dt=0.001", 2e-2),
+        ("mujoco", "Euler elliptic hard dt=0.0002", 1e-2),
+    ],
+)
+def test_peers_walk_near_our_path(engine, setting, bound):
+    found = run(engine, "quadruped", setting)
+    assert all_scenes()["quadruped"].errors(found, "")["path_max"] < bound
+    rates = (found.position[2:] - found.position[:-2]) / 0.02
+    assert found.velocity[20:-1] == pytest.approx(rates[19:], abs=0.05)
+
+
+def test_our_reference_of_the_walker_has_converged():
+    deck = s13_quadruped._deck({})
+    exact = converged.path(deck, *s13_quadruped.EXACT, body=2)
+    looser = converged.path(deck, "RADAU5", 1e-5, body=2)
+    assert np.abs(exact - looser).max() < 1e-6
