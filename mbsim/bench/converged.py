@@ -1,4 +1,4 @@
-"""References that are our own: a deck's path at a tight tolerance, where no closed form exists."""
+"""References that are our own: a deck's paths at a tight tolerance, where no closed form exists."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 
 
 @functools.lru_cache(maxsize=8)
-def path(text: str, integrator: str, tol: float, body: int) -> np.ndarray:
-    """Return a body's centre [m] at the rows of a deck, shape (n, 3)."""
+def paths(text: str, integrator: str, tol: float) -> tuple[np.ndarray, ...]:
+    """Return the centres of a deck's bodies [m] at its rows, by rising id, shape (n, 3) each."""
     from mbsim.reader.xml import read_model
     from mbsim.run.simulation import simulate
 
@@ -19,4 +19,4 @@ def path(text: str, integrator: str, tol: float, body: int) -> np.ndarray:
         deck = Path(folder) / "deck.xml"
         deck.write_text(text, encoding="utf-8")
         results = simulate(read_model(deck), integrator=integrator, tol=tol)
-    return np.asarray(results[f"bodies/{body}/position"])
+    return tuple(np.asarray(results[f"bodies/{n}/position"]) for n in sorted(results.ids("bodies")))

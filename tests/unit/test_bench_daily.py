@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mbsim.bench import converged, peers
+from mbsim.bench import converged, daily, peers
 from mbsim.bench import quadruped as walking
 from mbsim.bench.outcome import Outcome
 from mbsim.bench.scenes import all_scenes, s13_quadruped
@@ -59,7 +59,7 @@ def test_the_walker_is_put_together_and_stands_above_the_floor(tmp_path):
 
 def test_the_walker_is_held_to_its_converged_path(monkeypatch):
     exact = np.zeros((201, 3))
-    monkeypatch.setattr(converged, "path", lambda *_, **__: exact)
+    monkeypatch.setattr(converged, "paths", lambda *_: (exact,))
     place = np.zeros((201, 1, 3))
     place[100, 0] = [3e-3, 0.0, 4e-3]
     place[-1, 0, 0] = 1e-3
@@ -87,6 +87,65 @@ def test_peers_walk_near_our_path(engine, setting, bound):
 
 def test_our_reference_of_the_walker_has_converged():
     deck = s13_quadruped._deck({})
-    exact = converged.path(deck, *s13_quadruped.EXACT, body=2)
-    looser = converged.path(deck, "RADAU5", 1e-5, body=2)
+    exact = converged.paths(deck, *s13_quadruped.EXACT)[0]
+    looser = converged.paths(deck, "RADAU5", 1e-5)[0]
     assert np.abs(exact - looser).max() < 1e-6
+
+
+# --- chain_box
+
+
+def test_the_chain_is_closed_and_lies_above_the_box(tmp_path):
+    model = read(tmp_path, "chain_box")
+    assert model.warnings == ()
+    frames, c = marker_frames(model), daily.CHAIN
+    for number in range(3, 2 + c.count):
+        hinge = frames[10 * number + 2]
+        assert hinge.p == pytest.approx(frames[10 * number - 9].p, abs=1e-14)
+        assert hinge.R[:, 2] == pytest.approx([0.0, 1.0, 0.0])
+    assert frames[10].p[2] + c.box[2] / 2.0 == pytest.approx(0.0, abs=1e-15)
+    assert frames[21].p[2] == c.height > c.ball
+    # both ends are longer than the floor is deep
+    assert c.count * c.length / 2.0 - c.box[0] / 2.0 > -c.floor
+
+
+def swung():
+    """Return rows of the chain that turns about its first end, its links in one line."""
+    times = np.linspace(0.0, daily.CHAIN.end_time, 101)
+    place = np.tile([daily.CHAIN.start, daily.CHAIN.height], (101, 1))
+    hinge, rate = np.zeros((2, 101, daily.CHAIN.count))
+    hinge[:, 0], rate[:, 0] = 0.3 * times, 0.3
+    poses = daily.draped(place, np.zeros_like(place), hinge, rate)
+    return Outcome(0.1, times, *poses, {}, "")
+
+
+def test_the_chain_is_held_to_its_converged_paths(monkeypatch):
+    found = swung()
+    exact = tuple(np.moveaxis(found.position, 1, 0))
+    monkeypatch.setattr(converged, "paths", lambda *_: exact)
+    errors = all_scenes()["chain_box"].errors(found, "")
+    assert errors["path_max"] == errors["path_rms"] == 0.0
+    assert errors["joint_gap"] < 1e-14
+    moved = found.position.copy()
+    moved[50, 7] += [0.0, 3e-3, 4e-3]
+    errors = all_scenes()["chain_box"].errors(found._replace(position=moved), "")
+    assert errors["path_max"] == pytest.approx(5e-3)
+    assert errors["path_rms"] == pytest.approx(5e-3 / np.sqrt(101 * daily.CHAIN.count))
+    assert errors["joint_gap"] == pytest.approx(5e-3)
+
+
+def test_rates_of_a_chain_are_those_of_its_places():
+    found = swung()
+    rates = (found.position[2:] - found.position[:-2]) / 0.02
+    assert found.velocity[1:-1] == pytest.approx(rates, abs=1e-4)
+    assert found.position[0, :, 0] == pytest.approx(daily.CHAIN.centres())
+
+
+def test_the_chain_of_mujoco_falls_as_ours_and_is_closed():
+    found = run("mujoco", "chain_box", "implicitfast pyramidal hard dt=0.0005")
+    errors = all_scenes()["chain_box"].errors(found, "")
+    assert errors["path_rms"] < 0.1
+    assert errors["joint_gap"] < 1e-12
+    exact = np.stack(converged.paths(all_scenes()["chain_box"].deck({}), "AUTO", 1e-7), axis=1)
+    # up to the first impact, at 0.13 s, it is free fall with every engine
+    assert found.position[:13] == pytest.approx(exact[:13], abs=1e-3)

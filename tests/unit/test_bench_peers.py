@@ -86,13 +86,23 @@ CONTACT = ("S1", "S2a", "S3", "S4stick", "S4slip", "S5", "S7_125", "S10a", "S10c
 BOXES = ("S6", "S10b", "bin_50", "bin_200")
 MESHES = ("S9plane",)
 JOINTS = ("S8_2", "S8_10", "S8_40", "S8b")
-DAILY = ("quadruped",)
+DAILY = ("quadruped", "chain_box")
 SCENES_OF = {
     "mujoco": CONTACT + JOINTS + MESHES + BOXES + DAILY,
     "exudyn": CONTACT + JOINTS,
     "pybullet": CONTACT + MESHES,
     "drake": (*JOINTS, *MESHES, "S9torus", "quadruped"),
-    "ode": ("S3", "S4stick", "S4slip", "S7_125", "S7_1000", "S9plane", "S9torus", *BOXES),
+    "ode": (
+        "S3",
+        "S4stick",
+        "S4slip",
+        "S7_125",
+        "S7_1000",
+        "S9plane",
+        "S9torus",
+        "chain_box",
+        *BOXES,
+    ),
 }
 
 
@@ -207,6 +217,8 @@ def test_nothing_imports_an_engine_before_it_runs():
         ("S9plane", "QuickStep 20 dt=0.005", "z_error", 1e-6),
         ("S10b", "Step dt=0.005", "pen_max", 1e-5),
         ("bin_50", "QuickStep 20 dt=0.005", "pen_late", 2e-3),
+        ("chain_box", "QuickStep 20 dt=0.001", "path_rms", 3e-2),
+        ("chain_box", "QuickStep 20 dt=0.001", "joint_gap", 3e-3),
     ],
 )
 def test_ode_comes_to_what_is_known(scene, setting, measure, bound):

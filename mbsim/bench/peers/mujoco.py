@@ -20,6 +20,7 @@ from mbsim.bench import parameters as p
 from mbsim.bench.outcome import Outcome
 from mbsim.bench.peers import common
 from mbsim.bench.peers import mujoco_boxes as boxes
+from mbsim.bench.peers import mujoco_daily as daily
 from mbsim.bench.peers import mujoco_linkages as jointed
 from mbsim.bench.peers import mujoco_quadruped as walker
 from mbsim.bench.peers.laws import Law, hertz, hunt_crossley, impact, linear, stiff
@@ -180,6 +181,7 @@ def _cases(scene: str) -> dict[str, Callable[[], Case]]:
         "bin_50": lambda: boxes.bin_of(50),
         "bin_200": lambda: boxes.bin_of(200),
         "quadruped": walker.quadruped,
+        "chain_box": daily.chain_box,
     }
     return dict(scenes[scene]()) if scene in scenes else {}
 

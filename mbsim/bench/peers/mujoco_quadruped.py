@@ -22,13 +22,14 @@ SOFTNESS: dict[str, Callable[[float], str]] = {
 STEPS = (5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4)
 
 
-def _numbers(values: Sequence[float]) -> str:
+def numbers(values: Sequence[float]) -> str:
+    """Numbers as an attribute of MuJoCo's XML."""
     return " ".join(repr(float(x)) for x in values)
 
 
 def _from(origin: Sequence[float], place: Sequence[float]) -> str:
     """A place in the frame of a body whose axes are global."""
-    return _numbers([a - b for a, b in zip(place, origin, strict=True)])
+    return numbers([a - b for a, b in zip(place, origin, strict=True)])
 
 
 def _link(links: list[Link], k: int, origin: Sequence[float], more: str) -> str:
@@ -42,9 +43,9 @@ def _link(links: list[Link], k: int, origin: Sequence[float], more: str) -> str:
         inner = f'<geom type="sphere" size="{WALKER.foot!r}" pos="{at}" {more}/>'
     return (
         f'<body pos="{_from(origin, link.hinge)}">'
-        f'<joint name="j{k}" axis="{_numbers(link.axis)}" damping="{WALKER.damping!r}"/>'
+        f'<joint name="j{k}" axis="{numbers(link.axis)}" damping="{WALKER.damping!r}"/>'
         f'<inertial pos="{_from(link.hinge, link.centre)}" mass="{link.mass!r}" '
-        f'diaginertia="{_numbers([link.inertia] * 3)}"/>{inner}</body>'
+        f'diaginertia="{numbers([link.inertia] * 3)}"/>{inner}</body>'
     )
 
 
@@ -57,8 +58,8 @@ def _xml(option: str, softness: str) -> str:
     return (
         f'<mujoco><option {option} gravity="0 0 {-p.GRAVITY!r}"/><worldbody>'
         f'<geom type="plane" size="0 0 1" {more}/>'
-        f'<body pos="{_numbers(at)}"><freejoint/><inertial pos="0 0 0" mass="{w.trunk_mass!r}" '
-        f'diaginertia="{_numbers(w.trunk_inertia)}"/>{on_trunk}</body></worldbody>'
+        f'<body pos="{numbers(at)}"><freejoint/><inertial pos="0 0 0" mass="{w.trunk_mass!r}" '
+        f'diaginertia="{numbers(w.trunk_inertia)}"/>{on_trunk}</body></worldbody>'
         f"<actuator>{drives}</actuator></mujoco>"
     )
 

@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mbsim.bench import parameters as p
+from mbsim.bench.daily import CHAIN
 from mbsim.bench.outcome import Outcome
 from mbsim.bench.peers import common
 
@@ -35,7 +36,10 @@ TRIED = (1e-2, 5e-3, 2e-3, 1e-3)
 
 
 class Body(NamedTuple):
-    """A free body at t = 0: principal axes along its own, quaternion w first, global velocities."""
+    """A body at t = 0: principal axes along its own, quaternion w first, global velocities.
+
+    One of mass 0 keeps its velocities.
+    """
 
     mass: float
     inertia: Sequence[float]
@@ -53,6 +57,15 @@ class Shape(NamedTuple):
     numbers: Sequence[float]
 
 
+class Hinge(NamedTuple):
+    """A hinge of bodies `a` and `b`; a point and the direction of its axis in the world, t = 0."""
+
+    a: int
+    b: int
+    point: Sequence[float]
+    axis: Sequence[float]
+
+
 class Case(NamedTuple):
     """A scene; `sweeps` of QuickStep, 0 for the direct solver."""
 
@@ -66,6 +79,8 @@ class Case(NamedTuple):
     gravity: Sequence[float] = (0.0, 0.0, -p.GRAVITY)
     sample: float = p.SAMPLE
     contacts: int = OF_SOLIDS  # most of a pair
+    hinges: Sequence[Hinge] = ()
+    touch: bool = True  # shapes of two bodies do; else each touches fixed ones alone
 
 
 Cases = Iterator[tuple[str, Callable[[], Case]]]
@@ -145,6 +160,7 @@ def _numbers(case: Case, steps: common.Plan) -> Iterator[float]:
     yield from (case.dt, steps.steps_per_row, steps.rows, case.sweeps)
     # as ODE's manual recommends: 0.2 of an error is taken back in a step; contacts hardly give
     yield from (0.2, 1e-9, *case.gravity, case.mu, 0.0, 0.0, case.contacts, common.WALL_CAP)
+    yield float(case.touch)
     yield len(case.bodies)
     for body in case.bodies:
         yield from (body.mass, *body.inertia, *body.position)
@@ -156,6 +172,9 @@ def _numbers(case: Case, steps: common.Plan) -> Iterator[float]:
     for shape in case.shapes:
         yield from (shape.body, shape.kind, *shape.numbers)
         yield from [0.0] * (SHAPE - len(shape.numbers))
+    yield len(case.hinges)
+    for hinge in case.hinges:
+        yield from (hinge.a, hinge.b, *hinge.point, *hinge.axis)
 
 
 # ---------------------------------------------------------------------------------------------
@@ -179,6 +198,7 @@ def _cases(scene: str) -> dict[str, Callable[[], Case]]:
         "S10b": _heavy,
         "bin_50": lambda: _bin(50, (5e-3, 2e-3, 1e-3)),
         "bin_200": lambda: _bin(200, (5e-3, 2e-3, 1e-3)),
+        "chain_box": _draped,
     }
     return dict(scenes[scene]()) if scene in scenes else {}
 
@@ -283,6 +303,28 @@ def _bin(count: int, dts: Sequence[float]) -> Cases:
             dt, p.BIN.end_time, sweeps, boxes, shapes, p.BIN.mu, sample=p.BIN.sample
         ),
     )
+
+
+def _draped() -> Cases:
+    c = CHAIN
+    places = c.centres().tolist()
+    links = [Body(c.mass, c.inertia, (x, 0.0, c.height)) for x in places]
+    ball = (c.ball, c.length / 2.0, 0.0, 0.0)
+    shapes = (
+        Shape(-1, PLANE, (0.0, 0.0, 1.0, c.floor)),
+        Shape(-1, BOX, (*c.box, 0.0, 0.0, -c.box[2] / 2.0)),
+        *(Shape(k, SPHERE, ball) for k in range(c.count)),
+    )
+    hinges = [
+        Hinge(k, k - 1, (places[k] - c.length / 2.0, 0.0, c.height), (0.0, 1.0, 0.0))
+        for k in range(1, c.count)
+    ]
+
+    def case(dt: float, sweeps: int) -> Case:
+        return Case(dt, c.end_time, sweeps, links, shapes, c.mu, hinges=hinges, touch=False)
+
+    yield from _each((1e-2, 5e-3, 2e-3), (0,), case)
+    yield from _each((*TRIED, 5e-4, 2e-4), (20, 50), case)
 
 
 def _torus(*, upright: bool) -> Cases:

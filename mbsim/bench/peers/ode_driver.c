@@ -3,10 +3,13 @@
  *
  * Input: dt, steps a row, rows, sweeps of QuickStep (0: the direct solver), ERP, CFM,
  * gravity (3), mu, restitution, speed below which there is none, contacts of a pair, seconds it may
- * take; number of bodies, of each mass, principal inertia (3), place (3), quaternion (4), velocity
- * (3), spin (3); number of meshes, of each its vertices and triangles, and these; number of shapes,
- * of each its body (-1: fixed), kind, 7 numbers: PLANE a b c d; SPHERE radius; BOX edges (3);
- * CYLINDER radius, length (along z); MESH which, place (3) of a fixed one.
+ * take, whether shapes of two bodies touch; number of bodies, of each mass (0: it keeps its
+ * velocity), principal inertia (3), place (3), quaternion (4), velocity (3), spin (3); number of
+ * meshes, of each its vertices and triangles, and these; number of shapes, of each its body (-1:
+ * fixed), kind, 7 numbers: PLANE a b c d; SPHERE radius, place (3); BOX edges (3), place (3), turn
+ * about y; CYLINDER radius, length (along z), place (3); MESH which, place (3); places are on the
+ * body, or in the world where the shape is fixed; number of hinges, of each two bodies, a point on
+ * its axis (3) and its direction (3), in the world at t = 0.
  *
  * Output: seconds of the loop, largest depth over all steps, rows written, then the rows, of each
  * body place (3), quaternion (4), velocity (3), spin (3).
@@ -22,7 +25,7 @@ enum { MOST = 64, PER_BODY = 13 };
 static dWorldID world;
 static dJointGroupID touching;
 static dSurfaceParameters surface;
-static int most_contacts;
+static int most_contacts, bodies_touch;
 static double deepest;
 
 static double number(void) {
@@ -38,13 +41,28 @@ static void meet(void *unused, dGeomID i, dGeomID j) {
     dContact contacts[MOST];
     dBodyID a = dGeomGetBody(i), b = dGeomGetBody(j);
     (void)unused;
-    if (!a && !b) return;
+    if ((!a && !b) || (a && b && !bodies_touch)) return;
     int count = dCollide(i, j, most_contacts, &contacts[0].geom, sizeof(dContact));
     for (int k = 0; k < count; k++) {
         contacts[k].surface = surface;
         if (contacts[k].geom.depth > deepest) deepest = contacts[k].geom.depth;
         dJointAttach(dJointCreateContact(world, touching, &contacts[k]), a, b);
     }
+}
+
+/* Puts a shape on its body, or where it is fixed; x is its place and a turn about y. */
+static void put(dGeomID shape, dBodyID body, const double *x, double turn) {
+    dMatrix3 R;
+    dRFromAxisAndAngle(R, 0, 1, 0, turn);
+    if (!body) {
+        dGeomSetPosition(shape, x[0], x[1], x[2]);
+        dGeomSetRotation(shape, R);
+        return;
+    }
+    dGeomSetBody(shape, body);
+    if (x[0] == 0.0 && x[1] == 0.0 && x[2] == 0.0 && turn == 0.0) return;
+    dGeomSetOffsetPosition(shape, x[0], x[1], x[2]);
+    dGeomSetOffsetRotation(shape, R);
 }
 
 static double now(void) {
@@ -83,6 +101,7 @@ int main(void) {
     most_contacts = (int)number();
     if (most_contacts > MOST) most_contacts = MOST;
     double cap = number();
+    bodies_touch = (int)number();
 
     int count = (int)number();
     dBodyID *bodies = malloc(sizeof(dBodyID) * (count + 1));
@@ -90,10 +109,12 @@ int main(void) {
         double x[17];
         for (int k = 0; k < 17; k++) x[k] = number();
         dMass mass;
-        dMassSetParameters(&mass, x[0], 0, 0, 0, x[1], x[2], x[3], 0, 0, 0);
         bodies[b] = dBodyCreate(world);
         dQuaternion q = {x[7], x[8], x[9], x[10]};
-        dBodySetMass(bodies[b], &mass);
+        if (x[0] > 0.0) {
+            dMassSetParameters(&mass, x[0], 0, 0, 0, x[1], x[2], x[3], 0, 0, 0);
+            dBodySetMass(bodies[b], &mass);
+        } else dBodySetKinematic(bodies[b]);
         dBodySetPosition(bodies[b], x[4], x[5], x[6]);
         dBodySetQuaternion(bodies[b], q);
         dBodySetLinearVel(bodies[b], x[11], x[12], x[13]);
@@ -116,14 +137,22 @@ int main(void) {
         int body = (int)number(), kind = (int)number();
         double x[7];
         for (int k = 0; k < 7; k++) x[k] = number();
-        dGeomID shape;
-        if (kind == PLANE) shape = dCreatePlane(space, x[0], x[1], x[2], x[3]);
-        else if (kind == SPHERE) shape = dCreateSphere(space, x[0]);
-        else if (kind == BOX) shape = dCreateBox(space, x[0], x[1], x[2]);
-        else if (kind == CYLINDER) shape = dCreateCylinder(space, x[0], x[1]);
-        else shape = dCreateTriMesh(space, data[(int)x[0]], 0, 0, 0);
-        if (body >= 0) dGeomSetBody(shape, bodies[body]);
-        else if (kind == MESH) dGeomSetPosition(shape, x[1], x[2], x[3]);
+        dBodyID on = body >= 0 ? bodies[body] : 0;
+        if (kind == PLANE) dCreatePlane(space, x[0], x[1], x[2], x[3]);
+        else if (kind == SPHERE) put(dCreateSphere(space, x[0]), on, x + 1, 0.0);
+        else if (kind == BOX) put(dCreateBox(space, x[0], x[1], x[2]), on, x + 3, x[6]);
+        else if (kind == CYLINDER) put(dCreateCylinder(space, x[0], x[1]), on, x + 2, 0.0);
+        else put(dCreateTriMesh(space, data[(int)x[0]], 0, 0, 0), on, x + 1, 0.0);
+    }
+    int hinges = (int)number();
+    for (int h = 0; h < hinges; h++) {
+        int a = (int)number(), b = (int)number();
+        double x[6];
+        for (int k = 0; k < 6; k++) x[k] = number();
+        dJointID hinge = dJointCreateHinge(world, 0);
+        dJointAttach(hinge, a >= 0 ? bodies[a] : 0, b >= 0 ? bodies[b] : 0);
+        dJointSetHingeAnchor(hinge, x[0], x[1], x[2]);
+        dJointSetHingeAxis(hinge, x[3], x[4], x[5]);
     }
 
     double *stored = calloc((size_t)(rows + 1) * count * PER_BODY, sizeof(double));

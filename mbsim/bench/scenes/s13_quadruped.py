@@ -85,7 +85,7 @@ def _errors(outcome: Outcome, variant: str) -> dict[str, float]:
     ValueError
         If the rows are not those of the scene.
     """
-    exact = converged.path(_deck({}), *EXACT, body=2)
+    exact = converged.paths(_deck({}), *EXACT)[0]
     rows = np.rint(outcome.time / (WALKER.end_time / (len(exact) - 1))).astype(int)
     away = np.linalg.norm(outcome.position[:, 0] - exact[rows], axis=1)
     return {"path_max": float(away.max()), "path_end": float(away[-1])}

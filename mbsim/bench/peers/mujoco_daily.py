@@ -1,0 +1,69 @@
+"""Scenes of daily work in MuJoCo, but the walker: a chain on a box, and what rolls."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from mbsim.bench import parameters as p
+from mbsim.bench.daily import CHAIN, draped
+from mbsim.bench.peers import common
+from mbsim.bench.peers.mujoco_laws import Case
+from mbsim.bench.peers.mujoco_quadruped import SOFTNESS, numbers
+
+Cases = Iterator[tuple[str, Callable[[], Case]]]
+#: Shapes of the first kind touch those of the second alone.
+MOVING, FIXED = 'contype="1" conaffinity="0"', 'contype="0" conaffinity="1"'
+
+
+def _chain_xml(option: str, softness: str) -> str:
+    c = CHAIN
+    more = f'friction="{c.mu!r} 0 0" condim="3" {softness}'
+    inner = ""
+    for k in reversed(range(c.count)):
+        free = (
+            '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>' if k == 0 else ""
+        )
+        at = (c.start, 0.0, c.height) if k == 0 else (c.length, 0.0, 0.0)
+        inner = (
+            f'<body pos="{numbers(at)}">{free}<joint type="hinge" axis="0 -1 0"/>'
+            f'<inertial pos="{c.length / 2.0!r} 0 0" mass="{c.mass!r}" '
+            f'diaginertia="{numbers(c.inertia)}"/>'
+            f'<geom type="sphere" size="{c.ball!r}" pos="{c.length!r} 0 0" {more} {MOVING}/>'
+            f"{inner}</body>"
+        )
+    box = numbers([edge / 2.0 for edge in c.box])
+    return (
+        f'<mujoco><size memory="1G"/><option {option} gravity="0 0 {-p.GRAVITY!r}"/><worldbody>'
+        f'<geom type="plane" size="0 0 1" pos="0 0 {c.floor!r}" {more} {FIXED}/>'
+        f'<geom type="box" size="{box}" pos="0 0 {-c.box[2] / 2.0!r}" {more} {FIXED}/>'
+        f"{inner}</worldbody></mujoco>"
+    )
+
+
+def _chain_rows(time: np.ndarray, qpos: np.ndarray, qvel: np.ndarray) -> common.Rows:
+    """Rows of the links from two slides and the hinges."""
+    place = qpos[:, :2] + [CHAIN.start, CHAIN.height]
+    return common.Rows(time, *draped(place, qvel[:, :2], qpos[:, 2:], qvel[:, 2:]))
+
+
+def chain_box() -> Cases:
+    """A chain in minimal coordinates falls onto a box."""
+
+    def case(integrator: str, cone: str, softness: str, dt: float) -> Case:
+        option = f'timestep="{dt!r}" integrator="{integrator}" cone="{cone}"'
+        xml = _chain_xml(option, SOFTNESS[softness](dt))
+        still = np.zeros(CHAIN.count + 2)
+        note = "mujoco; soft contacts"
+        return Case(xml, dt, CHAIN.end_time, still, note, rows=_chain_rows)
+
+    kinds = (("implicitfast", "pyramidal"), ("RK4", "pyramidal"))
+    steps = (5e-3, 2e-3, 1e-3, 5e-4, 2e-4)
+    for (integrator, cone), softness, dt in itertools.product(kinds, SOFTNESS, steps):
+        if integrator == "RK4" and (dt > 2e-3 or softness != "stiff"):
+            continue  # it does not hold longer steps; the default lets balls through
+        name = f"{integrator} {cone} {softness} dt={dt:g}"
+        yield name, functools.partial(case, integrator, cone, softness, dt)
