@@ -158,6 +158,7 @@ class Points(NamedTuple):
     slides: F1  # (m,) s of `one_point.slip_of` as found last, 0 for none
     ahead: F1  # (m,) u_n + ahead >= 0 where the point closes
     part: F1  # (m,) of the step before an impact with restitution
+    held: I1  # (m,) 1 where other points are taken to keep the bodies from that impact
     closing: F1  # (m,) u_n before the step
     r: F2  # (m, 3)
     full: F2  # (m, 3) with all rebound, see `rebound`
@@ -309,6 +310,7 @@ def make(
         slides=numbers(m),
         ahead=numbers(m),
         part=numbers(m),
+        held=whole(m),
         closing=numbers(m),
         r=numbers(m, 3),
         full=numbers(m, 3),

@@ -37,6 +37,7 @@ from mbsim.stepping.arrays import (
     KEPT_STICKS,
     LEFT_PART,
     NEWTONS,
+    OWN_TIME,
     POINTS,
     PRESSING,
     PROJECTED,
@@ -84,6 +85,8 @@ from mbsim.stepping.solver import project_positions, solve_points
 MOST_YIELDS = 6
 #: Overlaps so many times deeper than what does not count are pushed out at a bounded speed.
 DEEP = 5.0
+#: So near to a surface, over the model's length, what would meet it without rebound is held there.
+NEARLY = 0.01
 #: A point that is let go of may close so many times faster than it does.
 LET_GO = 100.0
 #: How often a step's contact problem is solved at most, each time with what bodies hit that the
@@ -182,6 +185,36 @@ def look_ahead(S: Stepping, k: int, h: float) -> None:
 
 
 @jitable
+def is_held(S: Stepping, k: int, h: float) -> bool:
+    """Return whether other points may keep the bodies of point k from meeting there in the step.
+
+    They fly there; with the impulses of the last step they do not. Were they taken to meet, both
+    would be pushed off a place that they never come to.
+    """
+    P, M, number, gap = S.points, S.motion, S.plan.number, S.points.gap[k]
+    if gap <= number[SLOP] or gap + h * P.closing[k] < 0.0:
+        # it is there, or comes as it moves
+        return False
+    if P.ahead[k] >= 0.0 and gap <= NEARLY * number[OWN_TIME] * number[PUSH_SPEED]:
+        # it stays where it is: what rests does not rock on what is left of velocities
+        return False
+    if M.changed[P.body[k, 0]] == 1 or M.changed[P.body[k, 1]] == 1:
+        return True
+    return gap + 0.5 * h * (P.closing[k] + velocity_of(P, k, 0, M.v)) >= 0.0
+
+
+@jitable
+def let_meet(S: Stepping, count: int, h: float) -> bool:
+    """Let points meet that were taken to be held and press all the same; return if any do."""
+    P, some = S.points, False
+    for k in range(count):
+        if P.held[k] == 1 and P.r[k, 0] > 0.0:
+            look_ahead(S, k, h)
+            P.held[k], some = 0, True
+    return some
+
+
+@jitable
 def postpone(S: Stepping, count: int, h: float) -> bool:
     """Let go of points with restitution at which bodies meet that impulses threw at each other.
 
@@ -242,11 +275,20 @@ def start_impulses(scene: Scene, S: Stepping, h: float) -> None:
         b = body_awake(scene, row)
         for c in range(6):
             M.v[b, c] = M.free[b, c]
+        M.changed[b] = 0
     for k in range(S.tally.count[POINTS]):
-        look_ahead(S, k, h)
         if P.r[k, 0] > 0.0:
             r = (P.r[k, 0], P.r[k, 1], P.r[k, 2])
             apply(P, k, M.v, r)
+        if P.was[k] < 0 and P.gap[k] <= S.plan.number[SLOP]:
+            # what holds there is not known yet
+            M.changed[P.body[k, 0]] = M.changed[P.body[k, 1]] = 1
+    M.changed[ground] = 0
+    for k in range(S.tally.count[POINTS]):
+        look_ahead(S, k, h)
+        P.held[k] = 1 if P.part[k] != NO_IMPACT and is_held(S, k, h) else 0
+        if P.held[k] == 1:
+            P.ahead[k], P.part[k] = max(P.gap[k], 0.0) / h, NO_IMPACT
 
 
 @jitable
@@ -304,7 +346,8 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
         if near < allowed:
             allowed = near
             continue
-        changed = postpone(S, count, h)
+        changed = let_meet(S, count, h)
+        changed = postpone(S, count, h) or changed
         changed = let_stick(S, count, noise_of(S, h)) or changed
         noise = noise_of(S, h) * allowed / left_of(S, h)
         if not let_yield(S, count, noise) and not changed:

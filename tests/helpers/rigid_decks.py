@@ -88,16 +88,23 @@ def slope(folder: Path, mu: float, tangent: float, end_time: float, h: float | N
     return model(folder, parts, end_time, h)
 
 
-def stack(folder: Path, masses: list[float], end_time: float, h: float) -> Model:
+def stack(
+    folder: Path,
+    masses: list[float],
+    end_time: float,
+    h: float | None,
+    dt: float = 0.01,
+    restitution: float = 0.0,
+) -> Model:
     """Return touching cubes on each other."""
     ids = [100 * (2 + k) for k in range(len(masses))]
     parts = [cube(2 + k, m, 0.2, (0.0, 0.0, 0.2 * k + 0.1)) for k, m in enumerate(masses)]
     parts += [
-        text.contact(301, ids, ids, **rubbed(0.5)),
-        text.contact(302, ids, [100], **rubbed(0.5)),
+        text.contact(301, ids, ids, **rubbed(0.5, restitution)),
+        text.contact(302, ids, [100], **rubbed(0.5, restitution)),
         text.gravity(),
     ]
-    return model(folder, parts, end_time, h)
+    return model(folder, parts, end_time, h, dt)
 
 
 def rod(folder: Path, mu: float, angle: float, speed: float, end_time: float, h: float) -> Model:

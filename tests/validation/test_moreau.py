@@ -86,6 +86,31 @@ def test_a_stack_stands(tmp_path: Path) -> None:
     assert max(results[f"contacts/{c}/penetration"].max() for c in (301, 302)) < 1e-8
 
 
+@pytest.mark.parametrize("e", [0.0, 0.9])
+@pytest.mark.parametrize("h", [0.2, 0.3, 0.5])
+def test_a_stack_stands_in_steps_in_which_it_would_fall_its_height(
+    tmp_path: Path, h: float, e: float
+) -> None:
+    """What would come to the floor in free flight does not where the floor holds what is below."""
+    model = decks.stack(tmp_path, [1.0] * 4, 3.0, h, h, e)
+    results = mbsim.simulate(model, integrator="MOREAU", tol=1e-5)
+    for body in range(2, 6):
+        x = results[f"bodies/{body}/position"]
+        assert np.abs(x - x[0]).max() < 1e-5
+    assert results["contacts/302/force"][-1, 2] == pytest.approx(4.0 * G, rel=1e-4)
+
+
+def test_a_stack_takes_no_more_steps_with_a_looser_tolerance(tmp_path: Path) -> None:
+    """Its steps grow as long as rows let them, whatever may be left of a velocity."""
+    model = decks.stack(tmp_path, [1.0] * 10, 10.0, None, 0.05, 0.9)
+    steps = [
+        mbsim.simulate(model, integrator="MOREAU", tol=tol).stats["steps"]
+        for tol in (1e-2, 1e-3, 1e-4, 1e-6, 1e-8)
+    ]
+    assert all(steps[k] <= 1.2 * steps[k + 1] for k in range(4)), steps
+    assert steps[-1] < 40
+
+
 @pytest.mark.parametrize("h", [0.005, 0.001])
 def test_a_rod_that_jams_gains_no_energy(tmp_path: Path, h: float) -> None:
     """Painleve's rod, pushed against its friction, has no acceleration that obeys Coulomb's law.
