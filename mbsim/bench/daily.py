@@ -5,6 +5,7 @@ The walker's are in `quadruped`.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,3 +78,52 @@ def draped(
     centres = place[:, None] + np.cumsum(along, axis=1) - along / 2.0
     moved = speed[:, None] + np.cumsum(rates, axis=1) - rates / 2.0
     return linkages.planar(centres, angle, moved, turn)
+
+
+@dataclass(frozen=True)
+class Train:
+    """Equal cylinders along y roll down a slope one behind the other until a wall stops them.
+
+    The slope is the plane z = 0 under tilted gravity g (sin, 0, -cos); the first is at x = 0, the
+    others behind it.
+    """
+
+    count: int
+    radius: float  # m
+    length: float  # m
+    mass: float  # kg
+    pitch: float  # m, from axis to axis at t = 0
+    tilt: float  # rad
+    wall: float  # m, its place along x
+    mu: float
+    law: p.LinearLaw
+    end_time: float  # s
+
+    @property
+    def inertia(self) -> tuple[float, float]:
+        """About the axis, and across (kg m^2)."""
+        along = self.mass * self.radius**2 / 2.0
+        return along, along / 2.0 + self.mass * self.length**2 / 12.0
+
+    def centres(self) -> np.ndarray:
+        """Centres along x at t = 0, (count,), m; all at the height of a radius."""
+        return -self.pitch * np.arange(self.count)
+
+    def pull(self) -> tuple[float, float, float]:
+        """Gravity (m/s^2)."""
+        return (p.GRAVITY * math.sin(self.tilt), 0.0, -p.GRAVITY * math.cos(self.tilt))
+
+
+#: The damper is that of an impact that hardly rebounds: c / (2 sqrt(k m)) = 0.7.
+TRAIN = Train(
+    count=10,
+    radius=0.1,
+    length=0.3,
+    mass=5.0,
+    pitch=0.25,
+    tilt=math.radians(10.0),
+    wall=3.0,
+    mu=0.4,
+    law=p.LinearLaw(k=1e6, c=3e3),
+    end_time=3.0,
+)

@@ -149,3 +149,52 @@ def test_the_chain_of_mujoco_falls_as_ours_and_is_closed():
     exact = np.stack(converged.paths(all_scenes()["chain_box"].deck({}), "AUTO", 1e-7), axis=1)
     # up to the first impact, at 0.13 s, it is free fall with every engine
     assert found.position[:13] == pytest.approx(exact[:13], abs=1e-3)
+
+
+# --- cylinder_train
+
+
+def test_the_train_lies_on_the_slope_and_looks_at_the_wall(tmp_path):
+    model = read(tmp_path, "cylinder_train")
+    assert model.warnings == ()
+    frames, t = marker_frames(model), daily.TRAIN
+    assert frames[13].R[:, 2] == pytest.approx([-1.0, 0.0, 0.0])
+    for number in range(2, 2 + t.count):
+        base, centre = frames[10 * number + 1], frames[10 * number]
+        assert base.R[:, 2] == pytest.approx([0.0, 1.0, 0.0])
+        assert centre.p - base.p == pytest.approx([0.0, t.length / 2.0, 0.0])
+        assert centre.p[2] == t.radius
+    assert t.inertia == pytest.approx((0.025, 0.05))
+    assert np.linalg.norm(t.pull()) == pytest.approx(9.81)
+
+
+def test_the_train_is_held_to_its_converged_paths(monkeypatch):
+    t = daily.TRAIN
+    exact = np.zeros((301, t.count, 3))
+    exact[..., 0], exact[..., 2] = t.centres(), t.radius
+    monkeypatch.setattr(converged, "paths", lambda *_: tuple(np.moveaxis(exact, 1, 0)))
+    errors = all_scenes()["cylinder_train"].errors(outcome(exact, 3.0), "")
+    assert errors == {"path_rms": 0.0, "path_max": 0.0, "pen_end": 0.0}
+    moved = exact.copy()
+    moved[-1, 4, 0] += 0.06  # the gap is 0.05
+    errors = all_scenes()["cylinder_train"].errors(outcome(moved, 3.0), "")
+    assert errors["path_max"] == pytest.approx(0.06)
+    assert errors["path_rms"] == pytest.approx(0.06 / np.sqrt(301 * t.count))
+    assert errors["pen_end"] == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize(
+    ("engine", "setting", "bound"),
+    [
+        ("mujoco", "pyramidal hard dt=0.001", 3e-3),
+        ("pybullet", "default dt=0.001", 2e-2),
+        ("ode", "Step dt=0.001", 3e-3),
+    ],
+)
+def test_cylinders_of_peers_roll_as_rigid_ones(engine, setting, bound):
+    found, t = run(engine, "cylinder_train", setting), daily.TRAIN
+    # before the wall: 2/3 of the pull, for a cylinder that does not slip
+    way = t.pull()[0] / 3.0 * found.time[:200] ** 2
+    moved = found.position[:200, :, 0] - t.centres()
+    assert moved == pytest.approx(np.tile(way[:, None], t.count), abs=bound)
+    assert found.position[-1, 0, 0] == pytest.approx(t.wall - t.radius, abs=2e-2)

@@ -86,11 +86,11 @@ CONTACT = ("S1", "S2a", "S3", "S4stick", "S4slip", "S5", "S7_125", "S10a", "S10c
 BOXES = ("S6", "S10b", "bin_50", "bin_200")
 MESHES = ("S9plane",)
 JOINTS = ("S8_2", "S8_10", "S8_40", "S8b")
-DAILY = ("quadruped", "chain_box")
+DAILY = ("quadruped", "chain_box", "cylinder_train")
 SCENES_OF = {
     "mujoco": CONTACT + JOINTS + MESHES + BOXES + DAILY,
     "exudyn": CONTACT + JOINTS,
-    "pybullet": CONTACT + MESHES,
+    "pybullet": (*CONTACT, *MESHES, "cylinder_train"),
     "drake": (*JOINTS, *MESHES, "S9torus", "quadruped"),
     "ode": (
         "S3",
@@ -219,6 +219,7 @@ def test_nothing_imports_an_engine_before_it_runs():
         ("bin_50", "QuickStep 20 dt=0.005", "pen_late", 2e-3),
         ("chain_box", "QuickStep 20 dt=0.001", "path_rms", 3e-2),
         ("chain_box", "QuickStep 20 dt=0.001", "joint_gap", 3e-3),
+        ("cylinder_train", "Step dt=0.001", "path_rms", 3e-2),
     ],
 )
 def test_ode_comes_to_what_is_known(scene, setting, measure, bound):

@@ -182,6 +182,7 @@ def _cases(scene: str) -> dict[str, Callable[[], Case]]:
         "bin_200": lambda: boxes.bin_of(200),
         "quadruped": walker.quadruped,
         "chain_box": daily.chain_box,
+        "cylinder_train": daily.cylinder_train,
     }
     return dict(scenes[scene]()) if scene in scenes else {}
 

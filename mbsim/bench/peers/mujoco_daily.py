@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from mbsim.bench import parameters as p
-from mbsim.bench.daily import CHAIN, draped
+from mbsim.bench.daily import CHAIN, TRAIN, draped
 from mbsim.bench.peers import common
 from mbsim.bench.peers.mujoco_laws import Case
 from mbsim.bench.peers.mujoco_quadruped import SOFTNESS, numbers
@@ -67,3 +67,35 @@ def chain_box() -> Cases:
             continue  # it does not hold longer steps; the default lets balls through
         name = f"{integrator} {cone} {softness} dt={dt:g}"
         yield name, functools.partial(case, integrator, cone, softness, dt)
+
+
+def _train_xml(option: str, softness: str) -> str:
+    t = TRAIN
+    more = f'friction="{t.mu!r} 0 0" condim="3" {softness}'
+    size = numbers([t.radius, t.length / 2.0])
+    cylinders = "".join(
+        f'<body pos="{numbers([x, 0.0, t.radius])}"><freejoint/>'
+        f'<geom type="cylinder" size="{size}" zaxis="0 1 0" mass="{t.mass!r}" {more}/></body>'
+        for x in t.centres().tolist()
+    )
+    return (
+        f'<mujoco><option {option} gravity="{numbers(t.pull())}"/><worldbody>'
+        f'<geom type="plane" size="0 0 1" {more}/>'
+        f'<geom type="plane" size="0 0 1" pos="{t.wall!r} 0 0" zaxis="-1 0 0" {more}/>'
+        f"{cylinders}</worldbody></mujoco>"
+    )
+
+
+def cylinder_train() -> Cases:
+    """Cylinders roll down a slope to a wall."""
+
+    def case(cone: str, softness: str, dt: float) -> Case:
+        ratio = 10 if cone == "elliptic" else 1
+        option = f'timestep="{dt!r}" cone="{cone}" impratio="{ratio}"'
+        xml = _train_xml(option, SOFTNESS[softness](dt))
+        still = np.zeros((TRAIN.count, 6))
+        return Case(xml, dt, TRAIN.end_time, still, "mujoco; soft contacts")
+
+    steps = (1e-2, 5e-3, 2e-3, 1e-3, 5e-4)
+    for cone, softness, dt in itertools.product(("pyramidal", "elliptic"), SOFTNESS, steps):
+        yield f"{cone} {softness} dt={dt:g}", functools.partial(case, cone, softness, dt)

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mbsim.bench import parameters as p
-from mbsim.bench.daily import CHAIN
+from mbsim.bench.daily import CHAIN, TRAIN
 from mbsim.bench.outcome import Outcome
 from mbsim.bench.peers import common
 
@@ -199,6 +199,7 @@ def _cases(scene: str) -> dict[str, Callable[[], Case]]:
         "bin_50": lambda: _bin(50, (5e-3, 2e-3, 1e-3)),
         "bin_200": lambda: _bin(200, (5e-3, 2e-3, 1e-3)),
         "chain_box": _draped,
+        "cylinder_train": _train,
     }
     return dict(scenes[scene]()) if scene in scenes else {}
 
@@ -325,6 +326,26 @@ def _draped() -> Cases:
 
     yield from _each((1e-2, 5e-3, 2e-3), (0,), case)
     yield from _each((*TRIED, 5e-4, 2e-4), (20, 50), case)
+
+
+def _train() -> Cases:
+    t = TRAIN
+    along, across = t.inertia
+    lying = (math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0)  # a cylinder's own axis is z
+    cylinders = [
+        Body(t.mass, (across, across, along), (x, 0.0, t.radius), lying)
+        for x in t.centres().tolist()
+    ]
+    shapes = (
+        FLOOR,
+        Shape(-1, PLANE, (-1.0, 0.0, 0.0, -t.wall)),
+        *(Shape(k, CYLINDER, (t.radius, t.length)) for k in range(t.count)),
+    )
+    yield from _each(
+        (*TRIED, 5e-4),
+        (0, 20, 50),
+        lambda dt, sweeps: Case(dt, t.end_time, sweeps, cylinders, shapes, t.mu, gravity=t.pull()),
+    )
 
 
 def _torus(*, upright: bool) -> Cases:

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbsim.bench import parameters as p
+from mbsim.bench.daily import TRAIN
 from mbsim.bench.outcome import Outcome
 from mbsim.bench.peers import common, laws
 from mbsim.bench.peers.laws import Law
@@ -192,6 +193,7 @@ def _cases(scene: str) -> dict[str, Callable[[], Case]]:
         "S9plane": _torus,
         "S10a": _stiff_drop,
         "S10c": lambda: _free(p.S10C, (1e-3, 1e-4, 1e-5)),
+        "cylinder_train": _train,
     }
     return dict(scenes[scene]()) if scene in scenes else {}
 
@@ -358,3 +360,35 @@ def _grains(count: int) -> Cases:
             f"maximal=1 dt={dt:.4g}",
             functools.partial(Case, build, dt, end, note, sample=sample, cap=common.WALL_CAP),
         )
+
+
+def _train() -> Cases:
+    friction = math.sqrt(TRAIN.mu)  # coefficients of a pair are multiplied
+    along, across = TRAIN.inertia
+
+    def build(bullet: Any) -> list[int]:
+        bullet.setGravity(*TRAIN.pull())
+        for normal, through in (((0, 0, 1), (0, 0, 0)), ((-1, 0, 0), (TRAIN.wall, 0, 0))):
+            bullet.changeDynamics(_plane(bullet, normal, through), -1, lateralFriction=friction)
+        shape = bullet.createCollisionShape(
+            bullet.GEOM_CYLINDER, radius=TRAIN.radius, height=TRAIN.length
+        )
+        lying = bullet.getQuaternionFromAxisAngle([1.0, 0.0, 0.0], -math.pi / 2.0)
+        bodies = []
+        for x in TRAIN.centres().tolist():
+            place = [x, 0.0, TRAIN.radius]
+            # with maximal coordinates all places become NaN here
+            body = _body(bullet, TRAIN.mass, shape, place, maximal=False)
+            bullet.changeDynamics(
+                body,
+                -1,
+                lateralFriction=friction,
+                localInertiaDiagonal=[across, across, along],
+            )
+            bullet.resetBasePositionAndOrientation(body, place, lying)
+            bodies.append(body)
+        return bodies
+
+    note = "rigid, no restitution, starts touching"
+    for dt in (1e-2, TICK, 2e-3, 1e-3, 5e-4, 2e-4):
+        yield f"default dt={dt:.4g}", functools.partial(Case, build, dt, TRAIN.end_time, note)
