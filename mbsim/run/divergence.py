@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED, WHOLE
+from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED, WHOLE, WORST_BODY
 from mbsim.errors import SolverError
 
 if TYPE_CHECKING:
@@ -70,10 +70,10 @@ class Pace:
             long_ago = t - LATELY * passed
             before = next((v for _, when, v in reversed(self.seen) if when <= long_ago), 0.0)
             if speed > max(FAST * system.scene.world.scale[SCALE_SPEED], GROWTH * before):
-                _give_up(system, y, t, pace, "the motion leaves all bounds")
+                _give_up(system, y, t, pace, "the motion leaves all bounds", "")
         pace = self._pace(STALLED)
         if pace is not None and pace < SLIVER * passed:
-            _give_up(system, y, t, pace, "the run would not end")
+            _give_up(system, y, t, pace, "the run would not end", _pressed(system))
 
     def _is_old(self, seen: tuple[int, float, float], steps: int, t: float) -> bool:
         return seen[0] <= steps - STALLED and seen[1] <= t - LATELY * (t - self.start)
@@ -101,11 +101,22 @@ def _fastest(system: System, y: Any) -> float:
     return float(_speeds(system, y).max(initial=0.0))
 
 
-def _give_up(system: System, y: Any, t: float, pace: float, why: str) -> NoReturn:
+def _give_up(system: System, y: Any, t: float, pace: float, why: str, where: str) -> NoReturn:
     raise SolverError(
         f"no progress at time {t:.9g}: steps are {pace:.3g} on average and {why}; "
-        f"{_culprit(system, y, t)}. Results up to there are kept."
+        f"{where or _culprit(system, y, t)}. Results up to there are kept."
     )
+
+
+def _pressed(system: System) -> str:
+    """Return the body whose error bounds the steps and the contact that acts on it, "" for none."""
+    from mbsim.dynamics.pipeline.output import find_fault
+
+    contact, body = find_fault(system.scene), int(system.scene.work.diagnostics[WORST_BODY])
+    if contact < 0 or not 0 <= body < len(system.body_ids):
+        return ""
+    by = f"Force_Contact[{system.contact_ids[contact]}]"
+    return f"{system.body_name(body)} asks for them, on which {by} acts"
 
 
 def _culprit(system: System, y: Any, t: float) -> str:

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from lxml import etree
 
+import mbsim
 from helpers import fuzz_scenes, random_decks, standing
 from helpers.invariances import CHANGES
+from mbsim.errors import SolverError
 
 #: One of each scene, with different methods.
 QUICK = (0, 1, 4, 7, 10, 15)
@@ -44,6 +46,14 @@ def test_a_deck_stands_its_checks(seed, tmp_path):
     verdict = standing.judge(seed, tmp_path)
     assert all(kind == "told" for kind, _ in verdict["offences"]), verdict
     assert verdict["runs"] == 5
+
+
+@pytest.mark.slow
+def test_a_contact_whose_direction_jumps_is_named(tmp_path):
+    """Steps of 1e-10 behind a jump of the force's direction end the run, at that contact."""
+    case = standing.Case(122, tmp_path, tol=1e-7)
+    with pytest.raises(SolverError, match=r"no progress at time 0\.1.*Force_Contact\[1\]"):
+        mbsim.simulate(case.text, integrator="RADAU5", tol=1e-7)
 
 
 def test_a_run_goes_on_with_its_journal(tmp_path, monkeypatch, capsys):
