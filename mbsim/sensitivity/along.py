@@ -12,8 +12,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, view
 from mbsim.core.arrays import F1
@@ -21,42 +19,11 @@ from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import ASK
 from mbsim.dynamics.contact.forces import BRANCH, FOUND_AT
-from mbsim.integrators.dopri5 import (
-    A21,
-    A31,
-    A32,
-    A41,
-    A42,
-    A43,
-    A51,
-    A52,
-    A53,
-    A54,
-    A61,
-    A62,
-    A63,
-    A64,
-    A65,
-    B1,
-    B3,
-    B4,
-    B5,
-    B6,
-    C2,
-    C3,
-    C4,
-    C5,
-    E1,
-    E3,
-    E4,
-    E5,
-    E6,
-    E7,
-)  # fmt: skip
 from mbsim.integrators.scheme import Method, in_workspace
 from mbsim.laws.catalog import UNDECIDED
 from mbsim.sensitivity.arrays import (
     ALIKE,
+    ALONG,
     APART,
     ASKED,
     BEFORE,
@@ -65,11 +32,13 @@ from mbsim.sensitivity.arrays import (
     MOST,
     MOST_CHANGES,
     ODD,
+    REMEMBERED,
     STRAIGHT,
     TWIN,
     UP,
     Variations,
 )
+from mbsim.sensitivity.tableaus import LAST, OF_FIFTH, OF_THIRD, ORDER, A, C, E
 from mbsim.sensitivity.twin import (
     half_step,
     keep_change,
@@ -88,19 +57,6 @@ MANY_PARTS, PROGRESS, SHORTEST = 60, 0.01, 1e-9
 ROUGHEST = 1e-5
 #: Of a part of the step: begin and end of the stretch it is in, its length in the step's, its time.
 Span = tuple[float, float, float, float]
-C = np.array((0.0, C2, C3, C4, C5, 1.0, 1.0))
-A = np.array(
-    (
-        (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-        (A21, 0.0, 0.0, 0.0, 0.0, 0.0),
-        (A31, A32, 0.0, 0.0, 0.0, 0.0),
-        (A41, A42, A43, 0.0, 0.0, 0.0),
-        (A51, A52, A53, A54, 0.0, 0.0),
-        (A61, A62, A63, A64, A65, 0.0),
-        (B1, 0.0, B3, B4, B5, B6),
-    )
-)
-E = np.array((E1, 0.0, E3, E4, E5, E6, E7))
 #: Parts of a stretch by which its ends are left, until both sides of a difference touch alike.
 NEAREST, FARTHER = 1e-12, 4.0
 #: A difference is no smaller than this part of the usual one.
@@ -194,28 +150,31 @@ def try_part(
     span: Span,
     s: float,
     e: float,
+    row: int,
     begun: bool,
 ) -> tuple[int, float]:
     """Try a part of the step from s on; return a code, and the error over the derivative's size.
 
-    What it leads to is left in `work`; where the part has begun its first slope is there already.
+    By the method in a row of the tableaus. What it leads to is left in `work`; where the part has
+    begun its first slope is there already.
     """
     w, d = V.work, V.next[k]
     part, error, whole = span[3], 0.0, 1.0 / V.size[k]
-    for stage in range(1 if begun else 0, 7):
+    last = LAST[row]
+    for stage in range(1 if begun else 0, last + 1):
         for i in range(len(d)):
             rise = 0.0
             for j in range(stage):
-                rise += A[stage, j] * w[FIRST + j, i]
+                rise += A[row, stage, j] * w[FIRST + j, i]
             w[STAGE, i] = d[i] + part * rise
-        at = s + C[stage] * span[2]
+        at = s + C[row, stage] * span[2]
         code = clear_slope(V, scene, t, h, k, span[0], span[1], at, FIRST + stage, e)
         if code != 0:
             return code, 0.0
     for i in range(len(d)):
         off = 0.0
-        for j in range(7):
-            off += E[j] * w[FIRST + j, i]
+        for j in range(last + 1):
+            off += E[row, j] * w[FIRST + j, i]
         error = max(error, abs(part * off) / V.scale[i])
         whole = max(whole, abs(w[STAGE, i]) / V.scale[i], abs(d[i]) / V.scale[i])
     return 0, error / whole
@@ -229,15 +188,23 @@ def is_too_much(V: Variations) -> bool:
 
 @jitable
 def integrate(
-    V: Variations, scene: Scene, t: float, h: float, k: int, begin: float, end: float, e: float
+    V: Variations,
+    scene: Scene,
+    t: float,
+    h: float,
+    k: int,
+    span: tuple[float, float],
+    e: float,
+    begun: bool,
 ) -> int:
     """Carry the derivative in `next` from one part of the step to another; return a code.
 
-    By the method of order 5 of Dormand and Prince, as exactly as `enough` asks. Where forces bend
-    the steps get short.
+    By an explicit method, as exactly as `enough` asks. Where forces bend the steps get short. Its
+    first slope is left in `work`, of the end, as it may be there where the step has begun.
     """
+    begin, end = span
     w, d, s, part, most = V.work, V.next[k], begin, end - begin, V.enough[0]
-    tries, before, begun = 0, begin, False
+    tries, before, row = 0, begin, OF_THIRD if V.words[ALONG] == 1 else OF_FIFTH
     V.line[APART] = NEAREST
     while s < end:
         tries += 1
@@ -252,16 +219,16 @@ def integrate(
             before = s
         last = s + 1.0001 * part >= end
         part = end - s if last else part
-        code, error = try_part(V, scene, t, h, k, (begin, end, part, part * h), s, e, begun)
+        code, error = try_part(V, scene, t, h, k, (begin, end, part, part * h), s, e, row, begun)
         if code != 0:
             return code
         begun = True
         shortest = part <= SHORTEST or part * h <= 1e-15 * abs(t)
         if error <= most or shortest:
             for i in range(len(d)):
-                d[i], w[FIRST, i] = w[STAGE, i], w[FIRST + 6, i]
+                d[i], w[FIRST, i] = w[STAGE, i], w[FIRST + LAST[row], i]
             s = end if last else s + part
-        part *= min(4.0, max(0.1, 0.9 * (most / max(error, 1e-12)) ** 0.2))
+        part *= min(4.0, max(0.1, 0.9 * (most / max(error, 1e-12)) ** (1.0 / ORDER[row])))
     return 0
 
 
@@ -456,19 +423,39 @@ def is_bent(V: Variations, scene: Scene) -> bool:
 
 @jitable
 def step_along(
-    V: Variations, scene: Scene, m: Method, t: float, h: float, k: int, until: float
+    V: Variations,
+    scene: Scene,
+    m: Method,
+    t: float,
+    h: float,
+    k: int,
+    until: float,
+    goes_on: bool,
 ) -> int:
-    """Carry the derivative in `next` over a part of the step, contact by contact; return a code."""
-    e = half_step(V, k)
-    begin = 0.0
+    """Carry the derivative in `next` over a part of the step, contact by contact; return a code.
+
+    Where it goes on from the step before `slope` is that step's last one, and the one of this step
+    is left there.
+    """
+    e, begin = half_step(V, k), 0.0
+    begun = goes_on and V.words[ALONG] == 1 and V.smooth[k] == 1
+    if begun:
+        for i in range(V.next.shape[1]):
+            V.work[FIRST, i] = V.slope[k, i]
     for j in range(V.words[CHANGES]):
         end = V.change[j, 1]
         if end > until:
             break
-        code = integrate(V, scene, t, h, k, begin, end, e)
+        code = integrate(V, scene, t, h, k, (begin, end), e, begun)
         if code == 0:
             code = transfer(V, scene, t, h, k, j, e)
         if code != 0:
             return code
-        begin = max(begin, end)
-    return integrate(V, scene, t, h, k, begin, until, e)
+        begin, begun = max(begin, end), False
+    code = integrate(V, scene, t, h, k, (begin, until), e, begun)
+    if goes_on:
+        # what friction keeps is another number behind the step
+        V.smooth[k] = 1 if begin < until and V.words[REMEMBERED] == 0 else 0
+        for i in range(V.next.shape[1]):
+            V.slope[k, i] = V.work[FIRST, i]
+    return code

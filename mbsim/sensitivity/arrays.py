@@ -86,7 +86,7 @@ class Variations(NamedTuple):
     room: tags.Constant[F1]  # (n,) by how much it may be changed for a difference
     weights: tags.Constant[F1]  # of an explicit method's stages; none where joints hold bodies
     estimates: tags.Constant[F2]  # (1 or 2, stages) of its errors, up to the one at the step's end
-    slope: F2  # (P, n) D' of an explicit method's last stage
+    slope: F2  # (P, n) D' of the last stage of an explicit method, or along the motion
     smooth: I1  # (P,) 1 where that is D' at the committed point
     size: tags.Constant[F1]  # (P,) of a parameter
     first: tags.Constant[I1]  # (P + 1,) first of the numbers that a parameter changes

@@ -155,7 +155,8 @@ def carry(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) ->
         code = fit(V, scene, m, t, h, k, e)
     if code != 0 or not bends:
         return code
-    V.smooth[k] = 0
+    if V.words[ALONG] == 0:
+        V.smooth[k] = 0
     if V.words[ORDERED] == 0:
         V.words[ORDERED] = 1
         if not order_changes(V, scene, t, h):
@@ -163,7 +164,7 @@ def carry(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) ->
     for i in range(len(m.y)):
         V.next[k, i] = V.d[k, i]
     e = half_step(V, k)
-    code = step_along(V, scene, m, t, h, k, 1.0)
+    code = step_along(V, scene, m, t, h, k, 1.0, V.words[ALONG] == 1)
     if code == 0 and V.words[JOINTS] == 1:
         code = project_end(V, scene, m, t + h, k, e)
     if code == 0 and V.words[REMEMBERED] > 0:
@@ -278,7 +279,7 @@ def derivative_at(V: Variations, scene: Scene, m: Method, k: int, t: float, out:
         twin.world.past[0] = WITHIN
         for i in range(n):
             V.next[k, i] = V.kept[k, i]
-        code = step_along(V, scene, m, m.memory[LAST_TIME], h, k, s)
+        code = step_along(V, scene, m, m.memory[LAST_TIME], h, k, s, False)
         twin.world.past[0] = NOW
         for i in range(n):
             out[i] = V.next[k, i]
