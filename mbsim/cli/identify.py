@@ -44,12 +44,13 @@ def command(
     from mbsim.cli.count_bar import CountBar
     from mbsim.cli.messages import print_json
     from mbsim.cli.options import check_workers
-    from mbsim.errors import Interrupted
+    from mbsim.errors import Interrupted, ResultsError
     from mbsim.results.files import prepare_directory
     from mbsim.results.products import check_product
     from mbsim.studies.account import facts
     from mbsim.studies.identify import identify, pool_of
     from mbsim.studies.problem import read_problem
+    from mbsim.studies.stopping import stoppable
 
     check_workers(workers, scheduler)
     problem = read_problem(file)
@@ -60,8 +61,9 @@ def command(
     shown = progress == "auto" and sys.stderr.isatty()
     bar = CountBar("runs") if shown else None
     try:
-        pool = pool_of(problem, workers, scheduler)
-        found = identify(problem, pool, (lambda runs: bar.update(runs)) if bar else None)
+        with stoppable():
+            pool = pool_of(problem, workers, scheduler, lambda line: warn([line]))
+            found = identify(problem, pool, (lambda runs: bar.update(runs)) if bar else None)
     finally:
         if bar:
             bar.stop()
@@ -71,8 +73,10 @@ def command(
         print_json(about)
     else:
         _show(found, folder)
+    if found.stopped and found.stopped_by == 0:
+        raise ResultsError(f"stopped: the best so far is in {folder}")
     if found.stopped:
-        raise Interrupted(f"interrupted: the best so far is in {folder}")
+        raise Interrupted(f"interrupted: the best so far is in {folder}", found.stopped_by)
 
 
 def _write(found: Identified, folder: Path, about: dict[str, object]) -> None:

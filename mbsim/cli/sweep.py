@@ -59,6 +59,7 @@ def command(
     the outputs, and Saltelli's Sobol indices, in DIR/<study>.uncertainty.json too.
     """
     from mbsim.cli.count_bar import CountBar
+    from mbsim.studies.stopping import stoppable
     from mbsim.studies.study import read_study
     from mbsim.studies.sweep import sweep
 
@@ -72,14 +73,16 @@ def command(
     shown = progress == "auto" and sys.stderr.isatty()
     bar = CountBar("runs") if shown else None
     try:
-        swept = sweep(
-            study,
-            folder,
-            workers=workers,
-            scheduler=scheduler,
-            resume=resume,
-            progress=bar.update if bar else None,
-        )
+        with stoppable():
+            swept = sweep(
+                study,
+                folder,
+                workers=workers,
+                scheduler=scheduler,
+                resume=resume,
+                progress=bar.update if bar else None,
+                notify=lambda line: warn([line]),
+            )
     finally:
         if bar:
             bar.stop()
@@ -115,6 +118,7 @@ def _show(swept: Swept, as_json: bool) -> None:
                 **{name: swept.counts.get(name, 0) for name in ("finished", "warned", "failed")},
                 "kept": swept.kept,
                 "reasons": [{"runs": number, "reason": why} for number, why in swept.reasons],
+                "warnings": [{"runs": number, "reason": why} for number, why in swept.warnings],
                 "uncertainty": swept.uncertainty,
             }
         )
@@ -124,9 +128,9 @@ def _show(swept: Swept, as_json: bool) -> None:
     echo(f"{swept.table}: {counted(sum(swept.counts.values()), 'runs')}, {counts}{already}")
     for line in lines_of(swept.uncertainty) if swept.uncertainty else ():
         echo(line)
-    warn(
-        f"{counted(number, 'runs')} failed: {why}" for number, why in swept.reasons[:_MOST_REASONS]
-    )
-    if more := len(swept.reasons) - _MOST_REASONS:
-        warn([f"{more} more reasons are in the table"] if more > 0 else [])
+    for what, reasons in (("failed", swept.reasons), ("warned", swept.warnings)):
+        shown = reasons[:_MOST_REASONS]
+        warn(f"{counted(number, 'runs')} {what}: {why}" for number, why in shown)
+        if (more := len(reasons) - _MOST_REASONS) > 0:
+            warn([f"{more} more reasons why runs {what} are in the table"])
     warn(warnings_of(swept.uncertainty) if swept.uncertainty else [])

@@ -119,6 +119,8 @@ def table(study: Study) -> Numbers:
     file = study.csv
     assert file is not None
     columns, rows = _read_csv(file)
+    if twice := sorted({name for name in columns if columns.count(name) > 1}):
+        raise ModelError(f"{file}: columns that are there twice: {', '.join(twice)}")
     if missing := sorted(study.spreads.keys() - set(columns)):
         raise ModelError(f"{file}: no columns {', '.join(missing)}")
     if extra := sorted(set(columns) - study.spreads.keys()):
@@ -132,8 +134,9 @@ def _read_csv(file: Path) -> tuple[list[str], list[list[float]]]:
     try:
         with file.open(newline="", encoding="utf-8-sig") as text:
             lines = [line for line in csv.reader(text) if any(cell.strip() for cell in line)]
-    except (OSError, UnicodeDecodeError) as error:
-        raise ModelError(f"{file}: cannot be read: {error}") from None
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        why = getattr(error, "strerror", None) or error
+        raise ModelError(f"{file}: cannot be read: {why}") from None
     if len(lines) < 2:
         raise ModelError(f"{file}: needs a line of names and lines of numbers")
     names = [cell.strip() for cell in lines[0]]
@@ -144,7 +147,8 @@ def _read_csv(file: Path) -> tuple[list[str], list[list[float]]]:
         except ValueError:
             raise ModelError(f"{file}: row {number}: must be numbers") from None
         if len(line) != len(names) or not all(map(math.isfinite, rows[-1])):
-            raise ModelError(f"{file}: row {number}: must be {len(names)} finite numbers")
+            what = "a finite number" if len(names) == 1 else f"{len(names)} finite numbers"
+            raise ModelError(f"{file}: row {number}: must be {what}")
     return names, rows
 
 

@@ -21,6 +21,9 @@ _KINDS: dict[str, tuple[frozenset[str], frozenset[str]]] = {
     "triangular": (frozenset({"low", "mode", "high"}), frozenset()),
 }
 
+#: A normal distribution may be cut to this part of it; values of less are rounding.
+_LEAST_PART = 1e-9
+
 
 @dataclass(frozen=True)
 class Spread:
@@ -44,14 +47,11 @@ class Spread:
             return np.asarray(n["low"] + u * (n["high"] - n["low"]))
         if self.kind == "triangular":
             return _triangular(u, n["low"], n["mode"], n["high"])
-        from scipy.special import ndtr, ndtri
+        from scipy.special import ndtri
 
         if self.kind == "lognormal":
             return np.asarray(n["median"] * np.exp(math.log(n["factor"]) * ndtri(u)))
-        first, last = (
-            float(ndtr((n[name] - n["mean"]) / n["sd"])) if name in n else end
-            for name, end in (("low", 0.0), ("high", 1.0))
-        )
+        first, last = _parts_below(n)
         return np.asarray(n["mean"] + n["sd"] * ndtri(first + u * (last - first)))
 
     def levels(self) -> Numbers:
@@ -71,6 +71,17 @@ class Spread:
         return np.asarray(make(n["low"], n["high"], self.count))
 
 
+def _parts_below(n: dict[str, float]) -> tuple[float, float]:
+    """Return which parts of a normal distribution lie below where it is cut."""
+    from scipy.special import ndtr
+
+    first, last = (
+        float(ndtr((n[name] - n["mean"]) / n["sd"])) if name in n else end
+        for name, end in (("low", 0.0), ("high", 1.0))
+    )
+    return first, last
+
+
 def _triangular(u: Numbers, low: float, mode: float, high: float) -> Numbers:
     """Return the inverse of the triangular distribution function."""
     part = (mode - low) / (high - low)
@@ -79,9 +90,14 @@ def _triangular(u: Numbers, low: float, mode: float, high: float) -> Numbers:
     return np.where(u < part, left, right)
 
 
-def read_spread(table: dict[str, Any]) -> Spread:
-    """Return what a parameter's table says of its values; `ModelError` where that is nothing."""
+def read_spread(table: dict[str, Any], needed_here: bool = True) -> Spread:
+    """Return what a parameter's table says of its values; `ModelError` where that is nothing.
+
+    Where they are not `needed_here`, as its values are those of a CSV, it may say nothing.
+    """
     given = {key: value for key, value in table.items() if key != "path"}
+    if not given and not needed_here:
+        return Spread("values", {})
     kind = str(given.pop("distribution", "values" if "values" in given else "uniform"))
     if kind not in _KINDS:
         raise ModelError(f"distribution = {kind!r}: must be one of {', '.join(_KINDS)}")
@@ -97,7 +113,7 @@ def read_spread(table: dict[str, Any]) -> Spread:
         raise ModelError(f'scale = {scale!r}: must be "linear" or "log"')
     count = given.pop("count", 0)
     if type(count) is not int or count < 0:
-        raise ModelError(f"count = {count!r}: must be a whole number")
+        raise ModelError(f"count = {count!r}: must be a whole number from 1 on")
     numbers = dict(zip(given, _numbers(list(given.values())), strict=True))
     _check_numbers(kind, numbers, scale == "log")
     return Spread(kind, numbers, (), scale == "log", count)
@@ -105,13 +121,13 @@ def read_spread(table: dict[str, Any]) -> Spread:
 
 def _known(kind: str) -> str:
     needed, allowed = _KINDS[kind]
-    return ", ".join(sorted(needed | allowed))
+    return ", ".join(["path", *sorted(needed | allowed)])
 
 
 def _numbers(values: Any) -> tuple[float, ...]:
     """Return numbers of a study file as floats."""
     if not isinstance(values, list) or not values:
-        raise ModelError("values: must be a list of numbers")
+        raise ModelError("values: must be a list of numbers, one at least")
     for value in values:
         if type(value) not in (int, float) or not math.isfinite(value):
             raise ModelError(f"{value!r}: must be a finite number")
@@ -126,6 +142,10 @@ def _check_numbers(kind: str, n: dict[str, float], log: bool) -> None:
         raise ModelError('scale = "log" needs low above 0')
     if kind == "normal" and not n["sd"] > 0.0:
         raise ModelError(f"sd = {n['sd']:g}: must be above 0")
+    if kind == "normal":
+        first, last = _parts_below(n)
+        if last - first < _LEAST_PART:
+            raise ModelError(f"nothing of it is left between low and high: {last - first:.1g}")
     if kind == "lognormal" and not (n["median"] > 0.0 and n["factor"] > 1.0):
         raise ModelError("lognormal needs median above 0 and factor above 1")
     if kind == "triangular" and not n["low"] <= n["mode"] <= n["high"]:

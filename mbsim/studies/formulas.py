@@ -36,9 +36,13 @@ class Formula:
         self.text = text
         try:
             tree = ast.parse(text.strip(), mode="eval")
-        except (SyntaxError, ValueError):
-            raise ModelError(f"{text!r}: is no formula") from None
-        _check(tree.body, text, names)
+            _check(tree.body, text, names)
+        except (SyntaxError, ValueError, RecursionError, MemoryError):
+            raise ModelError(f"{text[:60]!r}: is no formula") from None
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Constant) and isinstance(node.value, int):
+                # a power of whole numbers may have more digits than there is time for
+                node.value = float(node.value)
         self.names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
         self._code = compile(tree, "<formula>", "eval")
 
@@ -46,7 +50,10 @@ class Formula:
         """Return its value; ArithmeticError or ValueError where there is none."""
         # `_check` has let nothing in that is not arithmetic
         scope: dict[str, Any] = {"__builtins__": {}, **_FUNCTIONS, **_CONSTANTS, **values}
-        found = eval(self._code, scope)
+        try:
+            found = eval(self._code, scope)
+        except OverflowError:
+            raise ArithmeticError("a number out of range") from None
         if isinstance(found, complex):
             raise ArithmeticError("a root of a negative number")
         return float(found)

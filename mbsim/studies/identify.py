@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mbsim.errors import Interrupted, SolverError
+from mbsim.errors import Interrupted, ResultsError, SolverError
 from mbsim.studies.columns import Columns
 from mbsim.studies.differences import Checked, NoDifference
 from mbsim.studies.distributions import Numbers
@@ -52,7 +52,9 @@ class Identified:
         Why runs failed: how many, and why, the most frequent first.
     warnings : list of str
     stopped : bool
-        Whether Ctrl-C came.
+        Whether Ctrl-C came, or a scheduler does not answer any more.
+    stopped_by : int
+        The number of the signal, 0: it was the scheduler.
     """
 
     problem: Problem
@@ -64,10 +66,18 @@ class Identified:
     reasons: list[tuple[int, str]]
     warnings: list[str]
     stopped: bool
+    stopped_by: int = 2
 
 
-def pool_of(problem: Problem, workers: int | None = None, scheduler: str | None = None) -> Pool:
+def pool_of(
+    problem: Problem,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    notify: Callable[[str], None] | None = None,
+) -> Pool:
     """Return who runs a problem: local processes, one a processor, or a Dask cluster.
+
+    `notify` is called with lines for the user while it waits.
 
     Raises
     ------
@@ -77,7 +87,7 @@ def pool_of(problem: Problem, workers: int | None = None, scheduler: str | None 
     if scheduler is not None:
         from mbsim.studies.cluster import Cluster
 
-        return Cluster(problem.study, scheduler)
+        return Cluster(problem.study, scheduler, notify)
     return Workers(problem.study, workers or processors())
 
 
@@ -103,6 +113,8 @@ def identify(problem: Problem, pool: Pool, progress: Progress | None = None) -> 
         If the run at every start failed.
     Interrupted
         If Ctrl-C came before the first run was done.
+    ResultsError
+        If a scheduler did not answer any more before that.
     """
     starts = problem.start_points()
     fits = [Fit(start=start, z=start.copy()) for start in starts]
@@ -116,7 +128,9 @@ def identify(problem: Problem, pool: Pool, progress: Progress | None = None) -> 
         reasons = [(count, why) for why, count in rounds.reasons.most_common()]
         if best.curves is None:
             if rounds.stopped:
-                raise Interrupted("interrupted before the first run was done")
+                if rounds.signal == 0:
+                    raise ResultsError(f"{rounds.notes[-1]}: no run was done")
+                raise Interrupted("interrupted before the first run was done", rounds.signal)
             why = f": {reasons[0][1]}" if reasons else ""
             raise SolverError(f"{problem.study.file}: the run at every start failed{why}")
         judged, added, notes = _judged(problem, best, rounds)
@@ -125,8 +139,8 @@ def identify(problem: Problem, pool: Pool, progress: Progress | None = None) -> 
     warnings += [f"{count} runs warned: {why}" for why, count in rounds.warnings.most_common(3)]
     if judged is not None:
         warnings = [*judged.warnings, *warnings]
-    stopped = rounds.stopped
-    return Identified(problem, best, fits, judged, added, rounds.runs, reasons, warnings, stopped)
+    about = (rounds.runs, reasons, warnings, rounds.stopped, rounds.signal)
+    return Identified(problem, best, fits, judged, added, *about)
 
 
 def _raise_ours(found: list[Fit | Exception]) -> None:

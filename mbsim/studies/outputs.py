@@ -120,7 +120,8 @@ class Output:
         if not 0 <= place < len(found):
             what = f"{self.event} of {self.element}" if self.element is not None else self.event
             raise Absent(
-                f"outputs.{self.name}: {len(found)} events: {what}; not number {self.which}"
+                f"outputs.{self.name}: no number {self.which} of the events {what}: "
+                f"there are {len(found)}"
             )
         return float(found[place])
 

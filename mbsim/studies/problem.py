@@ -59,6 +59,12 @@ class Unknown:
         """How wide the range is, of the value or its logarithm."""
         return math.log(self.high / self.low) if self.log else self.high - self.low
 
+    @property
+    def expected(self) -> float:
+        """Where the centre of its prior is."""
+        assert self.prior is not None
+        return math.exp(self.prior[0]) if self.prior_log else self.prior[0]
+
     def value(self, z: float) -> float:
         """Return the value at z, the bounds being exact."""
         if z <= 0.0 or z >= 1.0:
@@ -370,6 +376,11 @@ def _with_records(
     notes = [
         f"{r.file}: {r.missing} rows without a number are left out" for r in records if r.missing
     ]
+    notes += [
+        f"parameters.{u.name}: the centre of its prior, {u.expected:g}, is not within its bounds"
+        for u in problem.unknowns
+        if u.prior is not None and not u.low <= u.expected <= u.high
+    ]
     if checked is not None:
         for record in records:
             _check_times(problem, record, checked[1], faults)
@@ -392,7 +403,7 @@ def _checked(
     study: Study, values: Mapping[str, float], faults: list[str]
 ) -> tuple[Model, Settings] | None:
     """Return the deck with these values and how it is run, or None; with what is wrong."""
-    from mbsim.studies.sweep import check_signals, checked_system
+    from mbsim.studies.sweep import by_key, check_signals, checked_system
 
     if not study.model.is_file():
         if study.model.name != "None":  # that the study names none is said
@@ -411,24 +422,13 @@ def _checked(
         else:
             faults += check_signals(study, system, "records: signal")
             return system.model, settings
-        faults += [_by_key(study, line) for line in lines]
+        faults += [by_key(study, line) for line in lines]
         named = [p for p in overrides if any(line.startswith(f"--set {p}=") for line in lines)]
         if not named:
             break
         # what else there is is found without them
         overrides = {path: overrides[path] for path in overrides if path not in named}
     return None
-
-
-def _by_key(study: Study, line: str) -> str:
-    """Return what is wrong with the deck, with the key of the study that it follows from."""
-    for path, text in study.paths.items():
-        if line.startswith(f"--set {path}="):
-            said = line.partition(": ")[2]
-            name = text[1:-1]
-            key = f"parameters.{name}.path" if name in study.spreads else "set"
-            return f"{key}: {path}: {said}"
-    return line
 
 
 def _factors(one: Asked, model: Model, faults: list[str]) -> tuple[float, float, str]:

@@ -210,6 +210,8 @@ def read_columns(file: Path) -> Columns:
         raise ModelError(f"{file}: needs a line of names and lines of numbers")
     delimiter = max(_DELIMITERS, key=lines[0][1].count)
     names = [cell.strip() for cell in next(csv.reader([lines[0][1]], delimiter=delimiter))]
+    if twice := sorted({name for name in names if name and names.count(name) > 1}):
+        raise ModelError(f"{file}: columns that are there twice: {', '.join(twice)}")
     rows: list[list[float]] = []
     for number, line in lines[1:]:
         cells = next(csv.reader([line], delimiter=delimiter))

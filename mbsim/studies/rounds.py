@@ -13,7 +13,8 @@ import numpy as np
 from mbsim.errors import Interrupted
 from mbsim.studies.distributions import Numbers
 from mbsim.studies.records import TIME
-from mbsim.studies.worker import FAILED, WARNED, Pool, Row
+from mbsim.studies.stopping import number_of
+from mbsim.studies.worker import FAILED, WARNED, Pool, PoolLost, Row
 
 if TYPE_CHECKING:
     from mbsim.studies.problem import Problem
@@ -97,7 +98,9 @@ class Rounds:
     warnings : Counter
         Of what runs warned.
     stopped : bool
-        Whether Ctrl-C came.
+        Whether Ctrl-C came, or nobody runs them any more.
+    signal : int
+        The number of the signal, 0: nobody runs them any more.
     notes : list of str
         What is to be said of how far output rows are apart; from the first run on.
     """
@@ -109,7 +112,7 @@ class Rounds:
         self.runs = 0
         self.reasons: Counter[str] = Counter()
         self.warnings: Counter[str] = Counter()
-        self.stopped = False
+        self.stopped, self.signal = False, 2
         self.notes: list[str] = []
         self._looked_at = False
 
@@ -167,8 +170,11 @@ class Rounds:
                 if not self.stopped:
                     # in the same order whichever came first
                     self._run([p for r in sorted(waiting, key=lambda r: r.fit) for p in r.points])
-            except (KeyboardInterrupt, Interrupted):
-                self.stopped = True
+            except (KeyboardInterrupt, Interrupted) as error:
+                self.stopped, self.signal = True, number_of(error)
+            except PoolLost as error:
+                self.stopped, self.signal = True, 0
+                self.notes.append(str(error))
             for request in waiting:
                 known = [self._known.get(point.key) for point in request.points]
                 request.answer.put(None if self.stopped else known)

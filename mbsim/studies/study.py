@@ -173,7 +173,7 @@ def read_study(file: str | Path) -> Study:
             raise ModelError(f"{path}: {name}: must be a table")
     about = _about(tables["study"], len(tables["parameters"]), path, faults)
     options = read_options(tables["run"], path, faults)
-    spreads = _spreads(tables["parameters"], faults)
+    spreads = _spreads(tables["parameters"], about["design"] != "csv", faults)
     paths = read_paths(tables["parameters"], tables["set"], faults)
     outputs = _outputs(tables["outputs"], spreads, faults)
     if faults:
@@ -225,7 +225,7 @@ def _about(
     counted = design in SAMPLED
     if counted and runs == 0:
         faults.append(f"study.runs: {design} needs their number")
-    if not counted and "runs" in table:
+    if not counted and design in DESIGNS and "runs" in table:
         faults.append(f"study.runs: {design} says itself how many there are")
     if (design == "csv") != ("csv" in table):
         faults.append('study: design = "csv" goes with csv = "FILE"')
@@ -265,13 +265,13 @@ def read_options(table: Mapping[str, Any], path: Path, faults: list[str]) -> dic
     return found
 
 
-def _spreads(tables: Mapping[str, Any], faults: list[str]) -> dict[str, Spread]:
-    """Return the values of all parameters."""
+def _spreads(tables: Mapping[str, Any], needed: bool, faults: list[str]) -> dict[str, Spread]:
+    """Return the values of all parameters; of a CSV they are not `needed`."""
     spreads: dict[str, Spread] = {}
     for name, table in tables.items():
         if isinstance(table, dict):
             try:
-                spreads[name] = read_spread(table)
+                spreads[name] = read_spread(table, needed)
             except ModelError as error:
                 faults.append(f"parameters.{name}: {error}")
     return spreads
@@ -287,7 +287,10 @@ def read_paths(
 
     `elsewhere` names parameters that change something else; what is wrong is added to `faults`.
     """
+    from mbsim.reader.keywords import fold
+
     paths: dict[str, str] = {}
+    taken: set[str] = set()
     if not tables:
         faults.append("parameters: there are none")
     for name, table in tables.items():
@@ -302,12 +305,14 @@ def read_paths(
             faults.append(f"parameters.{name}: path: must be a text, or a list of texts")
             continue
         for each in listed:
-            if each in paths:
+            if fold(each) in taken:
                 faults.append(f"parameters.{name}: {each}: another parameter sets it too")
+            taken.add(fold(each))
             paths[each] = f"{{{name}}}"
     for each, text in given.items():
-        if each in paths:
-            faults.append(f"set.{each}: a parameter sets it too")
+        if fold(each) in taken:
+            faults.append(f"set.{each}: a parameter sets it too, or [set] does twice")
+        taken.add(fold(each))
         paths[each] = text if isinstance(text, str) else written(text)
     used = set(elsewhere)
     for each, text in paths.items():

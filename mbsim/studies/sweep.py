@@ -12,14 +12,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mbsim.errors import Interrupted, ModelError, SolverError
+from mbsim.errors import DeckError, Interrupted, ModelError, ResultsError, SolverError
 from mbsim.results.files import replace_text
 from mbsim.studies.journal import Journal, rows_kept
 from mbsim.studies.local import Workers
+from mbsim.studies.stopping import number_of
 from mbsim.studies.table import SUFFIX, Responses, need_pyarrow, write_table
 from mbsim.studies.uncertainty import SUFFIX as UNCERTAINTY
 from mbsim.studies.uncertainty import need_salib, uncertainty
-from mbsim.studies.worker import FAILED, Row, run_one
+from mbsim.studies.worker import FAILED, WARNED, PoolLost, Row, run_one
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 
 #: Called with how many rows there are, and how many there will be.
 Progress = Callable[[int, int], None]
+#: Called with a line for the user.
+Notify = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,8 @@ class Swept:
         How many rows were there already.
     reasons : list of (int, str)
         Why runs failed: how many, and why, the most frequent first.
+    warnings : list of (int, str)
+        Of what runs warned, likewise.
     uncertainty : dict or None
         Bands and Sobol indices, as ``<study>.uncertainty.json`` has them.
     """
@@ -52,6 +57,7 @@ class Swept:
     counts: dict[str, int]
     kept: int
     reasons: list[tuple[int, str]]
+    warnings: list[tuple[int, str]]
     uncertainty: dict[str, Any] | None
 
 
@@ -63,6 +69,7 @@ def sweep(
     scheduler: str | None = None,
     resume: bool = False,
     progress: Progress | None = None,
+    notify: Notify | None = None,
 ) -> Swept:
     """Run a study and write its table.
 
@@ -79,6 +86,8 @@ def sweep(
     resume : bool
         Keep rows of the same runs that a journal in the folder has.
     progress : callable, optional
+    notify : callable, optional
+        Called with lines for the user while it waits.
 
     Raises
     ------
@@ -87,7 +96,7 @@ def sweep(
     SolverError
         If not one run came to its end.
     ResultsError
-        If something cannot be written.
+        If something cannot be written, or a scheduler does not answer any more.
     Interrupted
         If Ctrl-C came; what is written stays.
     """
@@ -110,15 +119,16 @@ def sweep(
         progress(kept, len(same))
     try:
         with closing(Journal(path, resume)) as journal:
-            for row in _rows(study, left, workers, scheduler):
+            for row in _rows(study, left, workers, scheduler, notify):
                 journal.add(keys[row.run], row)
                 found[row.run] = row
                 if progress is not None:
                     progress(len(found), len(same))
-    except KeyboardInterrupt:
-        raise Interrupted(
-            f"interrupted: {len(found)} of {len(same)} runs are kept in {path}"
-        ) from None
+    except (KeyboardInterrupt, PoolLost) as error:
+        kept_now = f"{len(found)} of {len(same)} runs are kept in {path}; --resume goes on"
+        if isinstance(error, PoolLost):
+            raise ResultsError(f"{error}: {kept_now}") from None
+        raise Interrupted(f"interrupted: {kept_now}", number_of(error)) from None
     by_key = {keys[run]: row for run, row in found.items()}
     rows = [by_key[key]._replace(run=run) for run, key in enumerate(keys)]
     table = folder / f"{study.name}{SUFFIX}"
@@ -126,11 +136,16 @@ def sweep(
     for run in study.keep:
         write_run(study, run, folder)
     counts = Counter(row.status for row in rows)
-    reasons = Counter(row.reason for row in rows if row.status == FAILED).most_common()
+    reasons, warnings = _reasons(rows, FAILED), _reasons(rows, WARNED)
     if counts[FAILED] == count:
-        raise SolverError(f"{table}: not one of {count} runs came to its end: {reasons[0][0]}")
-    listed = [(number, why) for why, number in reasons]
-    return Swept(table, dict(counts), kept, listed, _write_uncertainty(study, table))
+        raise SolverError(f"{table}: not one of {count} runs came to its end: {reasons[0][1]}")
+    return Swept(table, dict(counts), kept, reasons, warnings, _write_uncertainty(study, table))
+
+
+def _reasons(rows: Sequence[Row], status: str) -> list[tuple[int, str]]:
+    """Return why rows have a status: how many, and why, the most frequent first."""
+    found = Counter(row.reason for row in rows if row.status == status).most_common()
+    return [(number, why) for why, number in found]
 
 
 def _write_uncertainty(study: Study, table: Path) -> dict[str, Any] | None:
@@ -146,13 +161,17 @@ def _write_uncertainty(study: Study, table: Path) -> dict[str, Any] | None:
 
 
 def _rows(
-    study: Study, runs: Sequence[int], workers: int | None, scheduler: str | None
+    study: Study,
+    runs: Sequence[int],
+    workers: int | None,
+    scheduler: str | None,
+    notify: Notify | None,
 ) -> Iterator[Row]:
     """Yield rows as they come, from where they are asked of."""
     if scheduler is not None:
         from mbsim.studies.cluster import cluster_rows
 
-        return cluster_rows(study, scheduler, runs)
+        return cluster_rows(study, scheduler, runs, notify)
     return Workers(study, workers or processors()).rows(runs)
 
 
@@ -187,8 +206,15 @@ def model_digest(study: Study) -> str:
     from mbsim.reader.keywords import fold
     from mbsim.results.identity import Identity
 
-    system, _ = checked_system(study, _first_changes(study))
-    if faults := check_signals(study, system, "outputs:"):
+    try:
+        system, _ = checked_system(study, _first_changes(study))
+    except ModelError as error:
+        lines = str(error).split("\n")
+        if isinstance(error, DeckError) or not any(line.startswith("--set ") for line in lines):
+            raise
+        said = (f"{study.file}: {by_key(study, line)}" for line in lines)
+        raise ModelError("\n".join(said)) from None
+    if faults := [*check_signals(study, system, "outputs:"), *_vectors(study, system)]:
         raise ModelError("\n".join(f"{study.file}: {line}" for line in faults))
     facts: dict[str, Any] = Identity(system).facts
     # without what differs from run to run, so that a study that grows keeps its rows
@@ -237,6 +263,28 @@ def check_signals(study: Study, system: System, key: str) -> list[str]:
     except ModelError as error:
         return str(error).replace("--signals", key).split("\n")
     return []
+
+
+def _vectors(study: Study, system: System) -> list[str]:
+    """Return which outputs are of several numbers a row, a line each."""
+    from mbsim.results.quantities import quantity_in
+
+    return [
+        f"outputs.{output.name}: {output.signal} is a vector: name one component"
+        for output in study.outputs
+        if output.signal and not quantity_in(system.model, output.signal)[1]
+    ]
+
+
+def by_key(study: Study, line: str) -> str:
+    """Return what is wrong with the deck, with the key of the study that it follows from."""
+    for path, text in study.paths.items():
+        if line.startswith(f"--set {path}="):
+            said = line.partition(": ")[2]
+            name = text[1:-1]
+            key = f"parameters.{name}.path" if name in study.spreads else "set"
+            return f"{key}: {path}: {said}"
+    return line
 
 
 def _first_changes(study: Study) -> dict[str, str]:

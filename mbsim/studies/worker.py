@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
-from mbsim.errors import Interrupted, MbsimError, UnknownSignal
+from mbsim.errors import Interrupted, MbsimError, ResultsError, UnknownSignal
 from mbsim.studies.outputs import Absent
 
 if TYPE_CHECKING:
@@ -22,6 +22,10 @@ FINISHED, WARNED, FAILED = "finished", "warned", "failed"
 
 #: Users' code and the compiler have one state a process: runs take turns.
 _ALONE = threading.Lock()
+
+
+class PoolLost(ResultsError):
+    """Who runs a study cannot be reached any more: what is not done yet will not be."""
 
 
 class Row(NamedTuple):

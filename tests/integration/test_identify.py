@@ -29,7 +29,8 @@ from mbsim.cli.main import main
 from mbsim.errors import ModelError
 from mbsim.studies.identify import identify
 from mbsim.studies.problem import read_problem
-from mbsim.studies.worker import Here
+from mbsim.studies.stopping import Stop
+from mbsim.studies.worker import Here, PoolLost
 
 BELT_ASKED = {
     "mu_static": "start = 0.95, low = 0.5, high = 2",
@@ -193,7 +194,15 @@ def test_the_command(tmp_path, monkeypatch):
     assert here.judged.parameters[0].sd == estimate["sd"]
 
 
-def test_ctrl_c_leaves_the_best_so_far(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("end", "code", "said"),
+    [
+        (KeyboardInterrupt, 130, "interrupted: "),
+        (Stop(15), 143, "interrupted: "),
+        (PoolLost("nobody answers"), 5, "warning: nobody answers"),
+    ],
+)
+def test_ctrl_c_leaves_the_best_so_far(tmp_path, monkeypatch, end, code, said):
     from mbsim.studies import identify as module
 
     class Stopping(Here):
@@ -203,7 +212,7 @@ def test_ctrl_c_leaves_the_best_so_far(tmp_path, monkeypatch):
             for row in super().share(cases, count):
                 Stopping.ran += 1
                 if Stopping.ran > 8:
-                    raise KeyboardInterrupt
+                    raise end
                 yield row
 
     monkeypatch.setattr(module, "pool_of", lambda problem, *_: Stopping(problem.study))
@@ -213,8 +222,9 @@ def test_ctrl_c_leaves_the_best_so_far(tmp_path, monkeypatch):
     sets = {**BELT_SETS, f"{CONTACT}.mu_dynamic": 0.5, f"{CONTACT}.stribeck_vel": 0.1}
     study(tmp_path, BELT, {"mu_static": "start = 0.9, low = 0.5, high = 2"}, sets, 0.01, 2.0)
     found = CliRunner().invoke(main, ["identify", "belt.toml"])
-    assert found.exit_code == 130, found.output
-    assert "interrupted: the best so far is in belt" in found.output
+    assert found.exit_code == code, found.output
+    assert ": the best so far is in belt" in found.output
+    assert said in found.output
     about = json.loads((tmp_path / "belt" / "belt.json").read_text())
     assert about["status"] == "stopped"
     assert 0.5 <= about["best"]["mu_static"] <= 2.0

@@ -20,13 +20,16 @@ from click.testing import CliRunner
 from helpers.folders import PACKAGES
 from mbsim import open_results, read_model, simulate
 from mbsim.cli.main import main
-from mbsim.errors import ModelError, SolverError
+from mbsim.errors import Interrupted, ModelError, ResultsError, SolverError
+from mbsim.studies.formulas import Formula
 from mbsim.studies.journal import rows_kept
 from mbsim.studies.local import MOST_TRIES, Workers
+from mbsim.studies.stopping import Stop, number_of, stoppable
 from mbsim.studies.study import read_study
 from mbsim.studies.sweep import model_digest, sweep
 from mbsim.studies.table import Responses, write_table
 from mbsim.studies.uncertainty import sobol_indices
+from mbsim.studies.worker import PoolLost
 
 pytest.importorskip("pyarrow")
 
@@ -177,6 +180,8 @@ def test_what_fails_and_what_warns_is_marked(tmp_path):
     study = read_study(study_file(tmp_path, text))
     swept = sweep(study, tmp_path / "out", workers=1)
     table = Responses(swept.table)
+    warned = int(np.count_nonzero(table["mu"] >= 0.15))
+    assert swept.warnings == [(warned, "outputs.early: no output row at time 0.025")]
     light = table["mu"] < 0.15
     assert 0 < light.sum() < 12
     assert (table["status"] == np.where(light, "failed", "warned")).all()
@@ -200,6 +205,8 @@ def test_a_study_of_which_no_run_ends_is_an_error(tmp_path):
         (("bodies/2/position/x", "bodies/9/position/x"), "outputs: bodies/9/position/x: this"),
         (("301].stiffness", "302].stiffness"), r"no Force_Contact\[302\]"),
         (("[run]", '[run]\nintegrator = "NONE"'), "NONE"),
+        (("301].stiffness", "301].stifness"), r"toml: parameters.k.path: Force_.*did you mean"),
+        (("position/x", "position"), "outputs.x: bodies/2/position is a vector"),
     ],
 )
 def test_what_no_run_can_do_is_said_before_the_first(tmp_path, change, said):
@@ -207,6 +214,67 @@ def test_what_no_run_can_do_is_said_before_the_first(tmp_path, change, said):
     with pytest.raises(ModelError, match=said):
         sweep(study, tmp_path / "out", workers=1)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("[set]", '[set]\n"force_contact[301].STIFFNESS" = 1'), "a parameter sets it too"),
+        (
+            ("low = 0.1, high = 0.3", 'distribution = "normal", mean = 0, sd = 1e-3, low = 0.1'),
+            "parameters.mu: nothing of it is left between low and high",
+        ),
+        (("low = 0.1, high = 0.3", "lo = 0.1, values = [1]"), "unknown lo; known: path, values"),
+        (("low = 0.1, high = 0.3", "values = []"), "one at least"),
+        (("latin_hypercube", "lhs"), "must be one of grid, [a-z_, ]*csv$"),
+    ],
+)
+def test_what_is_wrong_with_a_study_is_said_when_it_is_read(tmp_path, change, said):
+    with pytest.raises(ModelError, match=said):
+        read_study(study_file(tmp_path, STUDY.replace(*change)))
+
+
+def test_parameters_of_a_csv_need_no_values(tmp_path):
+    text = STUDY.replace('design = "latin_hypercube"\nruns = {runs}', 'csv = "ball.csv"')
+    text = text.replace(', low = 5e7, high = 2e8, scale = "log"', "").replace(
+        "mu = {{ low = 0.1, high = 0.3 }}", "mu = {{}}"
+    )
+    (tmp_path / "ball.csv").write_text("mu,k\n0.1,1e8\n0.2,2e8\n")
+    assert read_study(study_file(tmp_path, text)).points.tolist() == [[1e8, 0.1], [2e8, 0.2]]
+    (tmp_path / "ball.csv").write_text("mu,k,k\n0.1,1e8,1e8\n")
+    with pytest.raises(ModelError, match="columns that are there twice: k"):
+        read_study(study_file(tmp_path, text))
+
+
+def test_a_formula_takes_no_longer_than_arithmetic_of_floats():
+    with pytest.raises(ArithmeticError, match="out of range"):
+        Formula("9**9**9**9", [])({})
+    with pytest.raises(ModelError, match="is no formula"):
+        Formula("-" * 100_000 + "1", [])
+    assert Formula("2**3 + 7/2", [])({}) == 11.5
+
+
+def test_signals_end_a_study_and_keep_its_rows(tmp_path, monkeypatch):
+    with pytest.raises(Stop) as stopped, stoppable():
+        os.kill(os.getpid(), signal.SIGTERM)
+    assert number_of(stopped.value) == signal.SIGTERM
+    study = read_study(study_file(tmp_path))
+
+    def stop(done, of):
+        if done == 2:
+            raise Stop(signal.SIGTERM)
+
+    with pytest.raises(Interrupted, match=r"2 of 12 runs are kept in .*; --resume") as ended:
+        sweep(study, tmp_path / "out", workers=1, progress=stop)
+    assert ended.value.exit_code == 143
+
+    def lost(*_):
+        raise PoolLost("the scheduler does not answer any more")
+        yield
+
+    monkeypatch.setattr("mbsim.studies.sweep._rows", lost)
+    with pytest.raises(ResultsError, match="any more: 2 of 12 runs are kept"):
+        sweep(study, tmp_path / "out", resume=True)
 
 
 def test_the_command(tmp_path, monkeypatch):
@@ -330,5 +398,7 @@ def test_a_scheduler_that_does_not_answer(tmp_path, monkeypatch):
 
     monkeypatch.setattr(cluster, "PATIENCE", 0.5)
     address = f"tcp://127.0.0.1:{free_port()}"
-    with pytest.raises(ModelError, match="no scheduler answers"):
+    with pytest.raises(ModelError, match="nobody answers"):
         sweep(read_study(study_file(tmp_path)), tmp_path / "out", scheduler=address)
+    with pytest.raises(ModelError, match="must be such as tcp://host:8786"):
+        sweep(read_study(study_file(tmp_path)), tmp_path / "out", scheduler="host")
