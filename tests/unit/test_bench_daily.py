@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mbsim.bench import converged, daily, peers
+from mbsim.bench import converged, daily, drum, peers
 from mbsim.bench import quadruped as walking
 from mbsim.bench.outcome import Outcome
 from mbsim.bench.scenes import all_scenes, s13_quadruped
@@ -198,3 +198,77 @@ def test_cylinders_of_peers_roll_as_rigid_ones(engine, setting, bound):
     moved = found.position[:200, :, 0] - t.centres()
     assert moved == pytest.approx(np.tile(way[:, None], t.count), abs=bound)
     assert found.position[-1, 0, 0] == pytest.approx(t.wall - t.radius, abs=2e-2)
+
+
+# --- drums
+
+
+@pytest.mark.parametrize("count", [300, 3000])
+def test_spheres_start_apart_inside_of_the_drum(count):
+    made = drum.DRUMS[count]
+    at = drum.places(made)
+    upright = np.array([1.0, 0.0, 0.0, 0.0])
+    assert at.shape == (count, 3)
+    assert drum.deepest(made, np.zeros(3), upright, at) == 0.0
+    assert at[:, 2].mean() < 0.0  # filled from below
+    with pytest.raises(ValueError, match="the drum holds"):
+        drum.places(drum.Drum(3000, 0.3, 8))
+
+
+def test_faces_of_the_drum_look_inward_and_bound_what_is_measured(tmp_path):
+    model = read(tmp_path, "drum_300", {"k": 1e5})
+    assert model.warnings == ()
+    frames, made = marker_frames(model), drum.DRUMS[300]
+    faces = [frames[50001 + k] for k in range(drum.SIDES)]
+    for face, normal in zip(faces, drum.outward(), strict=True):
+        assert face.R[:, 2] == pytest.approx(-normal, abs=1e-15)
+        assert face.R.T @ face.R == pytest.approx(np.eye(3), abs=1e-15)
+        assert np.linalg.det(face.R) == pytest.approx(1.0)
+        assert face.p == pytest.approx(made.apothem * normal, abs=1e-15)
+    for face, side in ((frames[50101], -1.0), (frames[50102], 1.0)):
+        assert face.R[:, 2] == pytest.approx([0.0, -side, 0.0])
+        assert np.linalg.det(face.R) == pytest.approx(1.0)
+        assert face.p == pytest.approx([0.0, side * made.half_length, 0.0])
+
+
+def test_depth_in_a_drum_is_that_of_a_face_an_end_or_a_pair():
+    made, zero = drum.DRUMS[300], np.zeros(3)
+    r, upright = made.radius, np.array([1.0, 0.0, 0.0, 0.0])
+    face = np.array([[made.apothem - 0.9 * r, 0.0, 0.0]])
+    assert drum.deepest(made, zero, upright, face) == pytest.approx(0.1)
+    # half a face on there is an edge, farther from the axis
+    half = np.pi / drum.SIDES / 2.0
+    turned = np.array([np.cos(half), 0.0, np.sin(half), 0.0])
+    assert drum.deepest(made, zero, turned, face) == 0.0
+    end = np.array([[0.0, made.half_length - 0.7 * r, 0.0]])
+    assert drum.deepest(made, zero, upright, end) == pytest.approx(0.3)
+    assert drum.deepest(made, end[0], upright, end) == 0.0
+    pair = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.8 * r]])
+    assert drum.deepest(made, zero, upright, pair) == pytest.approx(0.2)
+    assert drum.deepest(made, zero, upright, np.full((1, 3), np.nan)) == np.inf
+
+
+@pytest.mark.parametrize(
+    ("engine", "setting"),
+    [("mujoco", "CG stiff dt=0.002"), ("ode", "QuickStep 20 dt=0.002")],
+)
+def test_drums_of_peers_turn_and_carry_spheres(engine, setting):
+    found, made = run(engine, "drum_300", setting), drum.DRUMS[300]
+    half = made.spin * found.time / 2.0
+    assert found.quaternion[:, 0, 2] == pytest.approx(np.sin(half), abs=1e-3)
+    errors = all_scenes()["drum_300"].errors(found, "")
+    assert errors["pen_rows_over_r"] < 0.2
+    assert -0.12 < errors["lift"] < -0.06
+
+
+def test_our_drum_turns_and_carries_spheres_as_theirs(tmp_path):
+    from mbsim.bench import ours
+
+    made = all_scenes()["drum_300"]
+    setting = ours.Setting("VERLET", 1e-2, {"k": 3e5})
+    found = ours.run(read(tmp_path, "drum_300", setting.variation), setting, 1, 300.0)
+    assert found.position[:, 0] == pytest.approx(np.zeros((51, 3)), abs=1e-5)
+    assert found.quaternion[-1, 0, 2] == pytest.approx(np.sin(1.5), abs=1e-4)
+    errors = made.errors(found, "")
+    assert errors["pen_max_over_r"] < 0.05
+    assert -0.12 < errors["lift"] < -0.06

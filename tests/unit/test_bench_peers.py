@@ -86,7 +86,7 @@ CONTACT = ("S1", "S2a", "S3", "S4stick", "S4slip", "S5", "S7_125", "S10a", "S10c
 BOXES = ("S6", "S10b", "bin_50", "bin_200")
 MESHES = ("S9plane",)
 JOINTS = ("S8_2", "S8_10", "S8_40", "S8b")
-DAILY = ("quadruped", "chain_box", "cylinder_train")
+DAILY = ("quadruped", "chain_box", "cylinder_train", "drum_300", "drum_3000")
 SCENES_OF = {
     "mujoco": CONTACT + JOINTS + MESHES + BOXES + DAILY,
     "exudyn": CONTACT + JOINTS,
@@ -220,6 +220,7 @@ def test_nothing_imports_an_engine_before_it_runs():
         ("chain_box", "QuickStep 20 dt=0.001", "path_rms", 3e-2),
         ("chain_box", "QuickStep 20 dt=0.001", "joint_gap", 3e-3),
         ("cylinder_train", "Step dt=0.001", "path_rms", 3e-2),
+        ("drum_300", "QuickStep 20 dt=0.002", "pen_rows_over_r", 0.2),
     ],
 )
 def test_ode_comes_to_what_is_known(scene, setting, measure, bound):

@@ -183,6 +183,8 @@ def _cases(scene: str) -> dict[str, Callable[[], Case]]:
         "quadruped": walker.quadruped,
         "chain_box": daily.chain_box,
         "cylinder_train": daily.cylinder_train,
+        "drum_300": lambda: daily.drum_of(300),
+        "drum_3000": lambda: daily.drum_of(3000),
     }
     return dict(scenes[scene]()) if scene in scenes else {}
 

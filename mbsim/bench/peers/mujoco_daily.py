@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import functools
 import itertools
+import math
 from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from mbsim.bench import drum as drums
 from mbsim.bench import parameters as p
 from mbsim.bench.daily import CHAIN, TRAIN, draped
 from mbsim.bench.peers import common
@@ -99,3 +101,70 @@ def cylinder_train() -> Cases:
     steps = (1e-2, 5e-3, 2e-3, 1e-3, 5e-4)
     for cone, softness, dt in itertools.product(("pyramidal", "elliptic"), SOFTNESS, steps):
         yield f"{cone} {softness} dt={dt:g}", functools.partial(case, cone, softness, dt)
+
+
+def _drum_xml(drum: drums.Drum, option: str, softness: str) -> str:
+    more = f'friction="{drum.mu!r} 0 0" condim="3" {softness}'
+    out, long = drum.apothem + drums.THICK / 2.0, drum.half_length
+    half = numbers([drums.THICK / 2.0, long, drum.face / 2.0])
+    # angles are about -y in a frame where z is up
+    faces = "".join(
+        f'<geom type="box" size="{half}" pos="{numbers(out * normal)}" '
+        f'quat="{math.cos(angle / 2.0)!r} 0 {-math.sin(angle / 2.0)!r} 0" {more}/>'
+        for angle, normal in zip(drums.angles().tolist(), drums.outward(), strict=True)
+    )
+    cap = numbers([drum.apothem, drums.THICK / 2.0, drum.apothem])
+    ends = "".join(
+        f'<geom type="box" size="{cap}" pos="0 {side * (long + drums.THICK / 2.0)!r} 0" {more}/>'
+        for side in (-1.0, 1.0)
+    )
+    spheres = "".join(
+        f'<body pos="{numbers(at)}"><freejoint/>'
+        f'<geom type="sphere" size="{drum.radius!r}" mass="{drum.mass!r}" {more}/></body>'
+        for at in drums.places(drum)
+    )
+    return (
+        f'<mujoco><size memory="4G"/><option {option} gravity="0 0 {-p.GRAVITY!r}"/><worldbody>'
+        f'<body><joint type="hinge" axis="0 1 0"/><inertial pos="0 0 0" mass="{drums.HEAVY!r}" '
+        f'diaginertia="{numbers([drums.HEAVY] * 3)}"/>{faces}{ends}</body>'
+        f"{spheres}</worldbody></mujoco>"
+    )
+
+
+def _drum_rows(time: np.ndarray, qpos: np.ndarray, qvel: np.ndarray) -> common.Rows:
+    """Rows of the drum, then of the spheres."""
+    n = len(qpos)
+    pose, twist = qpos[:, 1:].reshape(n, -1, 7), qvel[:, 1:].reshape(n, -1, 6)
+    spheres = common.rotate(pose[..., 3:], twist[..., 3:])
+    still, about = np.zeros((n, 1, 3)), np.zeros((n, 1, 3))
+    about[:, 0, 1] = qpos[:, 0]
+    spin = np.zeros((n, 1, 3))
+    spin[:, 0, 1] = qvel[:, 0]
+    return common.Rows(
+        time,
+        np.hstack([still, pose[..., :3]]),
+        np.hstack([common.quaternion_of(about), pose[..., 3:]]),
+        np.hstack([still, twist[..., :3]]),
+        np.hstack([spin, spheres]),
+    )
+
+
+def drum_of(count: int) -> Cases:
+    """Spheres in a drum that turns; its faces are boxes, for planes cannot move."""
+    drum = drums.DRUMS[count]
+
+    def case(solver: str, softness: str, dt: float) -> Case:
+        xml = _drum_xml(drum, f'timestep="{dt!r}" solver="{solver}"', SOFTNESS[softness](dt))
+        start = np.zeros(1 + 6 * count)
+        start[0] = drum.spin
+        note = "mujoco; soft contacts, pyramidal cone"
+        sample = drum.sample
+        return Case(xml, dt, drum.end_time, start, note, sample=sample, rows=_drum_rows)
+
+    solvers: tuple[str, ...] = ("CG",)
+    kinds: tuple[str, ...] = ("stiff",)
+    steps: tuple[float, ...] = (5e-3, 2e-3)
+    if count <= 300:
+        solvers, kinds, steps = ("CG", "Newton"), ("stiff", "hard"), (5e-3, 2e-3, 1e-3)
+    for solver, softness, dt in itertools.product(solvers, kinds, steps):
+        yield f"{solver} {softness} dt={dt:g}", functools.partial(case, solver, softness, dt)

@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mbsim.bench import drum as drums
 from mbsim.bench import parameters as p
 from mbsim.bench.daily import CHAIN, TRAIN
 from mbsim.bench.outcome import Outcome
@@ -200,6 +201,8 @@ def _cases(scene: str) -> dict[str, Callable[[], Case]]:
         "bin_200": lambda: _bin(200, (5e-3, 2e-3, 1e-3)),
         "chain_box": _draped,
         "cylinder_train": _train,
+        "drum_300": lambda: _drum(300, (5e-3, 2e-3, 1e-3, 5e-4)),
+        "drum_3000": lambda: _drum(3000, (2e-3, 1e-3, 5e-4)),
     }
     return dict(scenes[scene]()) if scene in scenes else {}
 
@@ -345,6 +348,35 @@ def _train() -> Cases:
         (*TRIED, 5e-4),
         (0, 20, 50),
         lambda dt, sweeps: Case(dt, t.end_time, sweeps, cylinders, shapes, t.mu, gravity=t.pull()),
+    )
+
+
+def _drum(count: int, dts: Sequence[float]) -> Cases:
+    drum = drums.DRUMS[count]
+    turning = Body(0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), spin=(0.0, drum.spin, 0.0))
+    inertia = 0.4 * drum.mass * drum.radius**2
+    spheres = [Body(drum.mass, [inertia] * 3, at) for at in drums.places(drum).tolist()]
+    out, long = drum.apothem + drums.THICK / 2.0, drum.half_length
+    faces = [
+        # angles are about -y in a frame where z is up
+        Shape(0, BOX, (drums.THICK, 2.0 * long, drum.face, *(out * normal), -angle))
+        for angle, normal in zip(drums.angles().tolist(), drums.outward(), strict=True)
+    ]
+    wide, end = 2.0 * drum.apothem, long + drums.THICK / 2.0
+    ends = [Shape(0, BOX, (wide, drums.THICK, wide, 0.0, side * end, 0.0)) for side in (-1.0, 1.0)]
+    balls = [Shape(1 + k, SPHERE, (drum.radius,)) for k in range(count)]
+    yield from _each(
+        dts,
+        (20,),
+        lambda dt, sweeps: Case(
+            dt,
+            drum.end_time,
+            sweeps,
+            [turning, *spheres],
+            [*faces, *ends, *balls],
+            drum.mu,
+            sample=drum.sample,
+        ),
     )
 
 
