@@ -1,8 +1,9 @@
 """Contact problems of `contact_problems.py`, each to 1e-4 within 5 s and to 1e-8 within 20 s.
 
-    python tests/bench/fclib_cases.py [PART OF A NAME ...]
+    python tests/bench/fclib_cases.py contact_problems.py [PART OF A NAME ...]
 
-Problems of bodies are given as global ones. Prints contacts, status, error and seconds of either
+The file has `cases()`: pairs of a name and of what makes W, q and mu, or H, M and v. Problems of
+bodies are given as global ones. Prints contacts, status, error and seconds of either
 tolerance, one core; compiling does not count.
 """
 
@@ -18,8 +19,6 @@ from scipy import sparse
 
 from mbsim.fclib.problem import Global, Local, matrix
 from mbsim.fclib.solve import solve
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
 
 #: Tolerances, and the seconds that they are given.
 ASKED = ((1e-4, 5.0), (1e-8, 20.0))
@@ -42,16 +41,14 @@ def problem_of(made: dict[str, Any]) -> Local | Global:
 
 def main() -> None:
     """Print the table."""
-    from helpers.folders import SHARED
-
-    path = SHARED / "found" / "contact_problems.py"
-    spec = importlib.util.spec_from_file_location("contact_problems", path)
+    file, *parts = sys.argv[1:]
+    spec = importlib.util.spec_from_file_location("contact_problems", Path(file))
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     for name, make in module.cases():
-        if len(sys.argv) > 1 and not any(part in name for part in sys.argv[1:]):
+        if parts and not any(part in name for part in parts):
             continue
         problem = problem_of(make())
         line = f"{name:22} {len(problem.mu):6d}"
