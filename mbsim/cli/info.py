@@ -1,4 +1,4 @@
-"""`mbsim info`: what is in a deck or in a result file."""
+"""`mbsim info`: what is in a deck, in a result file or in the table of a study."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from mbsim.model.elements import Model
     from mbsim.results.reading import Results
 
-_HDF5 = b"\x89HDF\r\n\x1a\n"
+_HDF5, _PARQUET = b"\x89HDF\r\n\x1a\n", b"PAR1"
 
 
 @click.command("info")
@@ -22,7 +22,9 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 @plugin_option("File with user subroutines of a model")
 @json_option("one JSON object")
 def command(file: Path, plugins: tuple[Path, ...], as_json: bool) -> None:
-    """Show what is in FILE, a model or a result file: elements, forces, end state, statistics.
+    """Show what is in FILE, a model, a result file or the table of a study.
+
+    Elements, forces, end state, statistics; of a table its columns and how runs ended.
 
     Scripts of --plugin are run, and each function of theirs is called once with iflag 1; those that
     only the deck names are not.
@@ -41,6 +43,8 @@ def command(file: Path, plugins: tuple[Path, ...], as_json: bool) -> None:
             return about
 
         about = read_apart(read, file)
+    elif _begins(file, _PARQUET):
+        about = _about_table(file)
     else:
         from mbsim.reader.xml import read_model
 
@@ -55,13 +59,54 @@ def command(file: Path, plugins: tuple[Path, ...], as_json: bool) -> None:
 
 def _is_result(file: Path) -> bool:
     """Return whether a file is HDF5, by what it holds; one that is not there, by its name."""
+    return _begins(file, _HDF5) or file.suffix.lower() in (".h5", ".hdf5")
+
+
+def _begins(file: Path, mark: bytes) -> bool:
+    """Return whether a file begins so; one that cannot be read does not."""
     from mbsim.core.stored import read_regular
 
     try:
-        head = read_regular(file, len(_HDF5))
-        return head == _HDF5 or file.suffix.lower() in (".h5", ".hdf5")
+        return read_regular(file, len(mark)) == mark
     except (OSError, ValueError):
-        return file.suffix.lower() in (".h5", ".hdf5")
+        return False
+
+
+def _about_table(file: Path) -> dict[str, Any]:
+    """Return how runs of a study ended, and what its numbers are."""
+    import numpy as np
+
+    from mbsim.results.form import finite
+    from mbsim.studies.table import Responses
+
+    table = Responses(file)
+    ends, counts = np.unique(table["status"], return_counts=True)
+
+    def spread(name: str) -> dict[str, Any]:
+        column = table[name]
+        there = column[~np.isnan(column)]
+        found: dict[str, Any] = {"missing": int(len(column) - len(there))}
+        if len(there):
+            found |= {
+                "least": float(there.min()),
+                "mean": float(there.mean()),
+                "most": float(there.max()),
+            }
+        return found
+
+    plain: dict[str, Any] = finite(
+        {
+            "kind": "study",
+            "file": str(file),
+            "model": table.model,
+            "runs": len(table),
+            "status": dict(zip(ends.tolist(), counts.tolist(), strict=True)),
+            "parameters": {name: spread(name) for name in table.parameters},
+            "outputs": {name: spread(name) for name in table.outputs},
+            "curves": ", ".join(table.curves),
+        }
+    )
+    return plain
 
 
 def _about_model(model: Model, plugins: tuple[Path, ...] = ()) -> dict[str, Any]:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from mbsim.errors import ResultsError
 from mbsim.studies.worker import Row
@@ -28,7 +29,10 @@ class Journal:
     def __init__(self, path: Path, resume: bool) -> None:
         self.path = path
         try:
-            self._stream = path.open("ab" if resume else "wb", buffering=0)
+            self._stream = path.open("ab", buffering=0)
+            _claim(self._stream, path)
+            if not resume:
+                self._stream.truncate(0)
             if resume and path.stat().st_size and not _ends_whole(path):
                 self._stream.write(b"\n")  # the last line was cut off
         except OSError as error:
@@ -50,6 +54,24 @@ class Journal:
                 self._since = 0
         except OSError as error:
             raise ResultsError(f"{self.path}: cannot be written: {error.strerror}") from None
+
+
+def _claim(stream: IO[bytes], path: Path) -> None:
+    """Lock a journal for this process; ResultsError where another one has it.
+
+    Where files cannot be locked, as on some network's, nothing is.
+    """
+    if sys.platform == "win32":
+        return
+    import fcntl
+
+    try:
+        fcntl.flock(stream.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        stream.close()
+        raise ResultsError(f"{path}: another sweep writes it; name another folder by -o") from None
+    except OSError:
+        return
 
 
 def _ends_whole(path: Path) -> bool:

@@ -89,7 +89,7 @@ class Responses:
         about = {k.decode(): v.decode() for k, v in (table.schema.metadata or {}).items()}
         if about.get("mbsim") != "study":
             raise ResultsError(f"{path}: is Parquet, but no table of a study")
-        self.path = path
+        self.path, self.model = path, about.get("model", "")
         self.parameters, self.outputs, self.curves = (
             [name for name in about[kind].split(",") if name]
             for kind in ("parameters", "outputs", "curves")

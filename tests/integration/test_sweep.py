@@ -12,6 +12,7 @@ import socket
 import subprocess
 import sys
 import threading
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -22,14 +23,14 @@ from mbsim import open_results, read_model, simulate
 from mbsim.cli.main import main
 from mbsim.errors import Interrupted, ModelError, ResultsError, SolverError
 from mbsim.studies.formulas import Formula
-from mbsim.studies.journal import rows_kept
+from mbsim.studies.journal import Journal, rows_kept
 from mbsim.studies.local import MOST_TRIES, Workers
 from mbsim.studies.stopping import Stop, number_of, stoppable
 from mbsim.studies.study import read_study
 from mbsim.studies.sweep import model_digest, sweep
 from mbsim.studies.table import Responses, write_table
 from mbsim.studies.uncertainty import sobol_indices
-from mbsim.studies.worker import PoolLost
+from mbsim.studies.worker import PoolLost, failed
 
 pytest.importorskip("pyarrow")
 
@@ -277,6 +278,21 @@ def test_signals_end_a_study_and_keep_its_rows(tmp_path, monkeypatch):
         sweep(study, tmp_path / "out", resume=True)
 
 
+def test_a_folder_is_one_sweeps_at_a_time(tmp_path):
+    path = tmp_path / "ball.jsonl"
+    row = failed(0, "no")
+    with closing(Journal(path, False)) as journal:
+        journal.add("a", row)
+        for resume in (False, True):
+            with pytest.raises(ResultsError, match="another sweep writes it"):
+                Journal(path, resume)
+    assert rows_kept(path, {"a": 0}) == {0: row}
+    Journal(path, True).close()
+    assert rows_kept(path, {"a": 0}) == {0: row}
+    Journal(path, False).close()
+    assert rows_kept(path, {"a": 0}) == {}
+
+
 def test_the_command(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     file = study_file(tmp_path, STUDY.replace("seed = 3", "seed = 3\nkeep = [2]"))
@@ -287,6 +303,10 @@ def test_the_command(tmp_path, monkeypatch):
     assert about["runs"] == about["finished"] == 12
     assert about["table"] == "ball/ball.parquet"
     table = Responses(tmp_path / "ball" / "ball.parquet")
+    said = json.loads(runner.invoke(main, ["info", "ball/ball.parquet", "--json"]).stdout)
+    assert said["kind"] == "study"
+    assert said["status"] == {"finished": 12}
+    assert said["outputs"]["x"]["most"] == table["x"].max()
     with open_results(tmp_path / "ball" / "run-2" / "bowling_ball.h5") as results:
         assert results["bodies/2/position/x"][-1] == table["x"][2]
     found = runner.invoke(main, ["sweep", str(file), "--only", "4"])
