@@ -317,8 +317,8 @@ def project_positions(p: Points, shift: F2, count: int, h: float, slop: float, m
 
     The least change in the norm of the mass: gap + h H_n shift >= 0 without friction, pushes start
     at 0. Where nothing ends so deep nothing changes. What begins deeper than `most`, as a deck may
-    begin, comes out by no more than that: a jump in positions is no motion that a shorter step
-    would find.
+    begin or a short step, comes out by no more than that: a jump in positions is no motion that a
+    shorter step would find.
     """
     for k in range(count):
         p.push[k] = 0.0

@@ -83,8 +83,6 @@ from mbsim.stepping.solver import project_positions, solve_points
 
 #: How often a step is solved at most, as what stuck slips.
 MOST_YIELDS = 6
-#: Overlaps so many times deeper than what does not count are pushed out at a bounded speed.
-DEEP = 5.0
 #: So near to a surface, over the model's length, what would meet it without rebound is held there.
 NEARLY = 0.01
 #: A point that is let go of may close so many times faster than it does.
@@ -360,8 +358,7 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
     tally.count[NEWTONS] += newtons
     spread_parts(scene, S, count, h, slop)
     fill_shift(scene, S)
-    most = max(DEEP * slop, h * S.plan.number[PUSH_SPEED])
-    pushes = project_positions(P, M.shift, count, h, slop, most)
+    pushes = project_positions(P, M.shift, count, h, slop, h * S.plan.number[PUSH_SPEED])
     number = tally.number
     # of two halves that make one step the worse one counts
     number[RESIDUAL] = left * allowed if committed else max(left * allowed, number[RESIDUAL])
