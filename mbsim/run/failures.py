@@ -44,6 +44,8 @@ def give_up(system: System, settings: Settings, method: Any) -> NoReturn:
     where.extend(_out_of_reach(system, settings))
     if counts[scheme.LAST_REASON] == problem.BY_NOT_FINITE:
         where.extend(_not_finite(system)[:1])
+        if not where and _is_nowhere(system):
+            raise SolverError(_touches_nowhere(system, float(memory[scheme.TIME])))
     if 0 <= contact < len(system.contact_ids):
         where.append(f"Force_Contact[{system.contact_ids[contact]}]")
     elif unsolved:
@@ -249,6 +251,16 @@ def _at_end(system: System, t: float) -> str:
         f"{system.connection_name(pair)} comes to an end of {what} at time {t:.9g} and has "
         "nowhere to go; results up to there are kept"
     )
+
+
+def _is_nowhere(system: System) -> bool:
+    """Return whether the step that was tried last found no place for a higher pair that holds."""
+    scene = system.scene
+    curves, off, lost = scene.curves, scene.equations.off, np.isnan(scene.sweep.located)
+    count = len(curves.closed)
+    on_curves = lost[:count] & (curves.touching == 1) & (off[curves.equation] == 0)
+    on_surfaces = lost[count:].reshape(-1, 2).any(axis=1) & (off[scene.surfaces.equation] == 0)
+    return bool(on_curves.any() or on_surfaces.any())
 
 
 def _touches_nowhere(system: System, t: float) -> str:
