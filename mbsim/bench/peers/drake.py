@@ -7,7 +7,6 @@ are held against the other scenes' nowhere else. A loop can be closed in discret
 from __future__ import annotations
 
 import functools
-import time
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -17,6 +16,7 @@ from mbsim.bench import linkages
 from mbsim.bench import parameters as p
 from mbsim.bench.outcome import Outcome
 from mbsim.bench.peers import common, drake_quadruped, drake_tori
+from mbsim.bench.peers.drake_rows import advanced
 
 NAME = "drake"
 
@@ -115,14 +115,7 @@ def _run(case: Case, repeats: int) -> Outcome:
             integrator.set_fixed_step_mode(not scheme.accuracy)
             if scheme.accuracy:
                 integrator.set_target_accuracy(scheme.accuracy)
-        simulator.Initialize()
-        state = np.empty((count + 1, len(case.position) + len(case.velocity)))
-        state[0] = plant.GetPositionsAndVelocities(context)
-        start = time.perf_counter()
-        for k in range(1, count + 1):
-            simulator.AdvanceTo(times[k])
-            state[k] = plant.GetPositionsAndVelocities(context)
-        return time.perf_counter() - start, state
+        return advanced(simulator, plant, context, times)
 
     wall, state = common.measure(once, repeats)
     half = len(case.position)

@@ -6,7 +6,6 @@ time of a pair is c/k. Friction is Coulomb's, regularised by the solver.
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 from mbsim.bench import parameters as p
 from mbsim.bench.outcome import Outcome
 from mbsim.bench.peers import common
+from mbsim.bench.peers.drake_rows import advanced
 from mbsim.bench.quadruped import WALKER, Link, foot_of, legs
 
 #: Contact approximations by name, and the steps that each is tried with [s].
@@ -38,14 +38,7 @@ def run(drake: Any, kind: str, dt: float, repeats: int) -> Outcome:
         context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
         pose = drake.RigidTransform(np.array([0.0, 0.0, WALKER.height]))
         plant.SetFreeBodyPose(context, trunk, pose)
-        simulator.Initialize()
-        state = np.empty((count + 1, 37))
-        state[0] = plant.GetPositionsAndVelocities(context)
-        start = time.perf_counter()
-        for k in range(1, count + 1):
-            simulator.AdvanceTo(times[k])
-            state[k] = plant.GetPositionsAndVelocities(context)
-        return time.perf_counter() - start, state
+        return advanced(simulator, plant, context, times)
 
     wall, state = common.measure(once, repeats)
     one = state[:, None, :]

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import functools
 import tempfile
-import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,6 +15,7 @@ import numpy as np
 from mbsim.bench import parameters as p
 from mbsim.bench.outcome import Outcome
 from mbsim.bench.peers import common
+from mbsim.bench.peers.drake_rows import advanced
 
 _MODULUS = 1e7  # Pa, hydroelastic
 _DISSIPATION = 1.0  # s/m, Hunt and Crossley
@@ -60,14 +60,7 @@ def _run(drake: Any, on_torus: bool, setting: Setting, repeats: int, folder: Pat
             drake.RotationMatrix.MakeXRotation(turn), np.array([0.0, 0.0, p.S9.height])
         )
         plant.SetFreeBodyPose(context, plant.GetBodyByName("torus"), pose)
-        simulator.Initialize()
-        state = np.empty((count + 1, 13))
-        state[0] = plant.GetPositionsAndVelocities(context)
-        start = time.perf_counter()
-        for k in range(1, count + 1):
-            simulator.AdvanceTo(times[k])
-            state[k] = plant.GetPositionsAndVelocities(context)
-        return time.perf_counter() - start, state
+        return advanced(simulator, plant, context, times)
 
     wall, state = common.measure(once, repeats)
     one = state[:, None, :]
