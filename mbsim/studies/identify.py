@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
@@ -66,7 +67,7 @@ class Identified:
     reasons: list[tuple[int, str]]
     warnings: list[str]
     stopped: bool
-    stopped_by: int = 2
+    stopped_by: int = signal.SIGINT
 
 
 def pool_of(
