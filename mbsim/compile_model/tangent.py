@@ -64,6 +64,8 @@ class Linear(NamedTuple):
     column: F3  # (border, nb, 6) force of a unit multiplier, or of a unit of a state
     row: F3  # (border, nb, 6) gradient of an equation, or of a state's slope by xi
     row_rate: F3  # (border, nb, 6) of a state's slope by the rates
+    # (1,) 1 where forces and joint forces, as they stand, count as they turn with bodies
+    stressed: tags.Constant[I1]
     released: I1  # (border,) rows of equations that do not hold while a loop passes a fold
     slopes: F2  # (states, states) of states by states
     basis: tags.Scratch[F3]  # (2, 9, 6)
@@ -156,8 +158,12 @@ def border_size(scene: Scene) -> int:
     return len(scene.equations.program) + len(scene.states.program)
 
 
-def make_tangent(scene: Scene, depends: Depends, pair: bool) -> Tangent:
-    """Return empty arrays for a scene; `pair`: for complex coefficients as well."""
+def make_tangent(scene: Scene, depends: Depends, pair: bool, stressed: bool = True) -> Tangent:
+    """Return empty arrays for a scene.
+
+    `pair`: for complex coefficients as well. `stressed`: with the geometric stiffness of forces,
+    which is exact; without it matrices of springs and dampers are positive definite.
+    """
     nb, nt, m = len(scene.bodies.mass), len(scene.tree.body), border_size(scene)
     nz, n = len(scene.states.program), scene.rows.y.shape[1]
     blocks = nb * nb if nb <= _ALL_COUPLED else min(nb * nb, _BLOCKS_A_BODY * nb)
@@ -202,6 +208,7 @@ def make_tangent(scene: Scene, depends: Depends, pair: bool) -> Tangent:
         np.zeros((m, nb, 6)),
         np.zeros((m, nb, 6)),
         np.zeros((m, nb, 6)),
+        np.array([stressed], dtype=np.int64),
         np.zeros(m, dtype=np.int64),
         np.zeros((nz, nz)),
         np.zeros((2, 9, 6)),

@@ -7,6 +7,7 @@ and wrenches are spatial vectors (linear, angular about the cg), global axes. r 
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -85,6 +86,13 @@ COMPARED, ALL_BODIES = 8, 9
 TALLY_COUNTS = 10
 
 
+# entries of `Plan.force`: addresses of what linearises, factors and solves, 0 where forces are
+# explicit; of `Forces.number`: the part of the step at which forces are taken, and how stiff they
+# are, as the rate of a damper
+LINEARISE, FACTOR, SOLVE = range(3)
+THETA, STIFFNESS = range(2)
+
+
 @tags.constant
 class Rules(NamedTuple):
     """What a Force_Contact says of rigid contact."""
@@ -100,9 +108,11 @@ class Plan(NamedTuple):
     number: F1  # (PLAN_NUMBERS,)
     near: I1  # (nk,) 1 where rows of a kind of pair that are apart are points of contact
     rows: I1  # (nk,) rows of a kind of pair, from its first slot on
-    group: I1  # (nb + 1,) of bodies that joints hold together, -1 for free ones and ground
+    # (nb + 1,) of bodies that joints hold together or forces couple, -1 for free ones and ground
+    group: I1
     members: I1  # (nb,) those bodies, group by group
     first: I1  # (groups + 1,) of each group's
+    force: I1  # (3,) how forces are implicit, see `implicit`
 
 
 @tags.scratch
@@ -192,6 +202,18 @@ class Tally(NamedTuple):
 
 
 @tags.state
+class Forces(NamedTuple):
+    """What implicit forces have, see `implicit`; no numbers where they are explicit."""
+
+    number: F1  # (2,)
+    stiffest: F1  # (ny,) a motion that turns to the stiffest one
+    coefficients: tags.Scratch[F1]  # (4,) of the linear systems
+    given: tags.Scratch[F1]  # (ny,) right side of one
+    found: tags.Scratch[F1]  # (ny,) its solution
+    slope: tags.Scratch[F1]  # (nz,) of the user's states, over the step
+
+
+@tags.state
 class Rest(NamedTuple):
     """Which bodies sleep, or may soon: see `stepping.sleep`."""
 
@@ -221,6 +243,7 @@ class Stepping(NamedTuple):
     kept: Kept
     tally: Tally
     rest: Rest
+    forces: Forces
 
 
 def at_rest(nb: int, nc: int, pairs: int, groups: int, side: I2) -> Rest:
@@ -249,14 +272,14 @@ def at_rest(nb: int, nc: int, pairs: int, groups: int, side: I2) -> Rest:
 
 
 def make(
-    rules: Rules, plan: Plan, side: I2, sizes: tuple[int, int, int, int, int, int, int]
+    rules: Rules, plan: Plan, side: I2, sizes: tuple[int, int, int, int, int, int, int, int]
 ) -> Stepping:
     """Return empty arrays.
 
     `sizes` are the numbers of bodies, graphics, numbers of y, contact points, pairs, wide rows,
-    groups of bodies; `side` is that of `Rest`.
+    groups of bodies, the user's states; `side` is that of `Rest`.
     """
-    nb, ng, ny, m, pairs, wide, groups = sizes
+    nb, ng, ny, m, pairs, wide, groups, nz = sizes
 
     def whole(*shape: int) -> np.ndarray:
         return np.zeros(shape, dtype=np.int64)
@@ -328,4 +351,9 @@ def make(
         np.zeros(TALLY_NUMBERS), whole(TALLY_COUNTS), numbers(nc, LOADS), whole(groups), numbers(nc)
     )
     tally.load[:, DUE] = 1.0
-    return Stepping(rules, plan, motion, points, kept, tally, rest)
+    n = ny if plan.force[LINEARISE] != 0 else 0
+    # what is not known yet may be stiff
+    forces = Forces(
+        np.array([1.0, math.inf]), numbers(n), numbers(4), numbers(n), numbers(n), numbers(nz)
+    )
+    return Stepping(rules, plan, motion, points, kept, tally, rest, forces)

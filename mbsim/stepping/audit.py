@@ -50,8 +50,8 @@ from mbsim.stepping.arrays import (
     STEP_LENGTH,
     Stepping,
 )
+from mbsim.stepping.forces import find_forces
 from mbsim.stepping.friction import left_of
-from mbsim.stepping.step import find_forces
 
 #: Rounding of friction on its cone.
 CONE_ROUNDING = 1e-12

@@ -86,6 +86,22 @@ def stand(S: Stepping, b: int) -> None:
 
 
 @jitable
+def start_from(scene: Scene, S: Stepping, y: F1) -> None:
+    """Let bodies, which are at y, go on as they move there, with no change of velocities."""
+    M = S.motion
+    for row in range(bodies_awake(scene)):
+        b = body_awake(scene, row)
+        at = BODY_SIZE * b
+        if S.rest.body[b, ASLEEP] == 1:
+            stand(S, b)
+            continue
+        for c in range(3):
+            M.v[b, c], M.v[b, 3 + c] = y[at + AT_V + c], scene.work.w[b, c]
+        for c in range(6):
+            M.before[b, c] = M.shift[b, c] = M.v[b, c]
+
+
+@jitable
 def fill_motion(scene: Scene, S: Stepping, y: F1, h: float) -> None:
     """Fill velocities before the step and without contacts, and inverse masses."""
     M, bodies, dy = S.motion, scene.bodies, S.motion.slope

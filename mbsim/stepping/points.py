@@ -28,6 +28,7 @@ from mbsim.stepping.arrays import (
     W_ZZ,
     Stepping,
 )
+from mbsim.stepping.implicit import is_implicit, yield_to_forces
 from mbsim.stepping.one_point import alone, answer_of, direction, fill_inverse, velocity_of
 
 #: Part of a step's motion by which pairs are looked for beyond it: others may hit what moves.
@@ -208,7 +209,7 @@ def list_moved(S: Stepping, k: int) -> bool:
 
 @jitable
 def widen(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
-    """Fill what impulses at point k do where joints hold its bodies, as rows from `begin` on.
+    """Fill what impulses at point k do where joints or forces hold its bodies: rows from `begin`.
 
     Return False if there is no room.
     """
@@ -225,10 +226,15 @@ def widen(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
         for side in range(2):
             b = P.body[k, side]
             if plan.group[b] >= 0:
+                answers_alone = scene.tree.of_body[b] < 0
                 for c in range(6):
-                    impulse[6 * b + c] += direction(P, k, side, a, c)
+                    e = direction(P, k, side, a, c)
+                    impulse[6 * b + c] += alone(P, k, side, a, c) if answers_alone else e
         joints = scene.world.hooks[Hook.JOINTS]
-        note_failure(scene, call_int(joints, (scene, Joints.IMPULSE, 0.0, impulse, impulse)))
+        if joints != 0:
+            note_failure(scene, call_int(joints, (scene, Joints.IMPULSE, 0.0, impulse, impulse)))
+        if is_implicit(S):
+            note_failure(scene, yield_to_forces(scene, S, impulse))
         for row in range(begin, begin + P.many[k]):
             b = P.moved[row]
             side = 0 if b == P.body[k, 0] else 1

@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numba import types
 
-from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.codes import MULTI_POINT, OF_POINTS, POINTS, SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.hooks import Hook
+from mbsim.compile_model.program_dependence import find_depends
+from mbsim.compile_model.tangent import MOST_BODIES
 from mbsim.core import jit
 from mbsim.core.address import pack
 from mbsim.core.problem import Problem, addresses
+from mbsim.dynamics.linearization.stiffness import sides_of
 from mbsim.errors import ModelError
 from mbsim.geometry.catalog import NEARS, PAIRS, REGION_ROWS
 from mbsim.stepping.arrays import (
@@ -44,9 +47,11 @@ from mbsim.stepping.arrays import (
 from mbsim.stepping.coefficients import Coefficients
 
 if TYPE_CHECKING:
+    from mbsim.arrays.scene import Scene
     from mbsim.arrays.state import Broadphase
     from mbsim.compile_model.build import System
     from mbsim.compile_model.pairing import Kind
+    from mbsim.compile_model.tangent import Depends
     from mbsim.core.arrays import I1 as Indices
     from mbsim.core.arrays import I2 as Table
 
@@ -72,6 +77,8 @@ COMPLIANT = frozenset(
         Hook.FCL_POINTS,
     }
 )
+#: Hooks that rigid contact has in place of those of compliant contact.
+OWN = frozenset({Hook.CONTACTS, Hook.NEAR})
 #: Pairs whose rows are features that may meet where the shapes are apart too.
 APART = frozenset(
     {
@@ -123,7 +130,37 @@ class Made(NamedTuple):
         }
 
 
-def _plan(system: System, fixed: bool, tol: float) -> Plan:
+def _changing_forces(scene: Scene, depends: Depends) -> list[set[int]]:
+    """Return, for each force that changes as bodies move, the moving bodies that it couples."""
+    applied, found = scene.applied, []
+    nb = len(scene.bodies.mass)
+    for f in range(len(applied.form)):
+        programs = [k for k in (applied.program[f], *applied.components[f]) if k >= 0]
+        looks = {b for k in programs for b in _listed(depends.body_start, depends.body, k)}
+        states = any(len(_listed(depends.state_start, depends.state, k)) > 0 for k in programs)
+        if (
+            applied.formula[f] == 0
+            and not looks
+            and not states
+            and not depends.user[programs].any()
+        ):
+            continue
+        points = [f]
+        if applied.form[f] == MULTI_POINT:
+            count = int(applied.par[f, POINTS])
+            points += applied.par[f, OF_POINTS : OF_POINTS + count].astype(int).tolist()
+        bodies = {b for k in points for b in sides_of(scene, k)}
+        bodies.add(int(scene.markers.body[applied.axes[f]]))
+        found.append({int(b) for b in bodies | looks if b < nb})
+    return found
+
+
+def _listed(start: Indices, items: Indices, k: int) -> list[int]:
+    """Return the items of row k of a list of lists."""
+    return [int(b) for b in items[start[k] : start[k + 1]]]
+
+
+def _plan(system: System, fixed: bool, tol: float, coupled: list[set[int]], force: Indices) -> Plan:
     """Return what holds for the run, and let pairs be measured where they are apart too."""
     from mbsim.compile_model.contacts import near_address, pair_address
 
@@ -139,7 +176,7 @@ def _plan(system: System, fixed: bool, tol: float) -> Plan:
     number = np.zeros(PLAN_NUMBERS)
     length = float(scene.world.scale[SCALE_LENGTH])
     number[FIXED] = float(fixed)
-    group, members, first = _groups(system)
+    group, members, first = _groups(system, coupled)
     number[SOME_AHEAD] = float(not near.all())
     number[PUSH_SPEED] = float(scene.world.scale[SCALE_SPEED])
     number[LEFT_SPEED] = tol * number[PUSH_SPEED]
@@ -151,38 +188,48 @@ def _plan(system: System, fixed: bool, tol: float) -> Plan:
     sources = [model.transient, *(simulation.transient for simulation in model.simulations)]
     awake = any(source is not None and source.sleep is False for source in sources)
     number[MAY_SLEEP] = float(not awake)
-    return Plan(number, near, rows, group, members, first)
+    return Plan(number, near, rows, group, members, first, force)
 
 
-def _groups(system: System) -> tuple[Indices, Indices, Indices]:
-    """Return the group of each body that joints hold, -1 for others; members and their firsts."""
+def _groups(system: System, coupled: list[set[int]]) -> tuple[Indices, Indices, Indices]:
+    """Return the group of each body that joints or forces hold, -1 for others; members and firsts.
+
+    Each of the sets `coupled` is of bodies that implicit forces couple.
+    """
     scene = system.scene
     tree, eq, nb = scene.tree, scene.equations, len(scene.bodies.mass)
-    # by roots of trees, which equations join
-    root = {int(k): int(k) for k in tree.root}
+    # by bodies: roots of trees, which equations and forces join
+    root = dict(enumerate(range(nb)))
 
-    def top(k: int) -> int:
-        while root[k] != k:
-            k = root[k]
-        return k
+    def top(b: int) -> int:
+        while root[b] != b:
+            b = root[b]
+        return b
 
+    def join(bodies: list[int]) -> None:
+        for other in bodies[1:]:
+            root[top(other)] = top(bodies[0])
+
+    for k, body in enumerate(tree.body):
+        join([int(tree.body[tree.root[k]]), int(body)])
     for e in range(len(eq.program)):
         held = []
         for k in range(eq.first[e], eq.first[e + 1]):
             for marker in (eq.i[k], eq.j[k]):
-                index = int(tree.of_body[scene.markers.body[marker]]) if marker >= 0 else -1
-                if index >= 0:
-                    held.append(top(int(tree.root[index])))
-        for other in held[1:]:
-            root[top(other)] = top(held[0])
+                body = int(scene.markers.body[marker]) if marker >= 0 else nb
+                if body < nb and tree.of_body[body] >= 0:
+                    held.append(body)
+        join(held)
+    for bodies in coupled:
+        join(sorted(bodies))
     groups: dict[int, list[int]] = {}
-    for k, body in enumerate(tree.body):
-        groups.setdefault(top(int(tree.root[k])), []).append(int(body))
+    for body in sorted({int(b) for b in tree.body}.union(*coupled)):
+        groups.setdefault(top(body), []).append(body)
     group = np.full(nb + 1, -1, dtype=np.int64)
-    for g, bodies in enumerate(groups.values()):
-        group[bodies] = g
-    members = np.array([b for bodies in groups.values() for b in bodies], dtype=np.int64)
-    sizes = [len(bodies) for bodies in groups.values()]
+    for g, held_bodies in enumerate(groups.values()):
+        group[held_bodies] = g
+    members = np.array([b for held in groups.values() for b in held], dtype=np.int64)
+    sizes = [len(held) for held in groups.values()]
     return group, members, np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
 
 
@@ -221,13 +268,30 @@ def rigid_mechanism(system: System, fixed: bool, tol: float) -> Made:
                 "take AUTO"
             )
     found = Coefficients(system)
-    plan = _plan(system, fixed, tol)
+    depends = find_depends(scene)
+    coupled = _changing_forces(scene, depends)
     nb = len(scene.bodies.mass)
+    tables: list[Any] = []
+    force = np.zeros(3, dtype=np.int64)
+    if coupled or len(scene.states.program) > 0:
+        if nb > MOST_BODIES:
+            found.said.append(
+                f"forces are taken at the begin of steps: {nb} bodies are more than the "
+                f"{MOST_BODIES} whose forces are implicit"
+            )
+            coupled = []
+        else:
+            from mbsim.dynamics.pipeline.problem import linear_systems
+
+            of_forces, *tables = linear_systems(scene, depends, set(Hook) - COMPLIANT - OWN)
+            force[:] = [of_forces[name] for name in ("linearise", "factor", "solve")]
+    plan = _plan(system, fixed, tol, coupled, force)
     capacity = min(len(scene.slots.pair), POINTS_EACH * (nb + 4))
     largest = int(np.diff(plan.first).max(initial=0))
     wide = min(capacity * 2 * largest, MOST_WIDE) if largest > 0 else 1
     ng, ny = len(scene.graphics.body), scene.rows.y.shape[1]
-    sizes = nb, ng, ny, capacity, len(scene.pairs.kind), wide, len(scene.audit.sums)
+    groups, nz = len(scene.audit.sums), len(scene.states.program)
+    sizes = nb, ng, ny, capacity, len(scene.pairs.kind), wide, groups, nz
     stepping = make(found.rules, plan, _sides(scene.broadphase, ng), sizes)
     inner, outer = pack(stepping), pack(scene)
     scene.world.hooks[Hook.STEPPING] = int(inner.ctypes.data)
@@ -239,7 +303,7 @@ def rigid_mechanism(system: System, fixed: bool, tol: float) -> Made:
         scene.world.hooks[Hook.CONTACTS] = jit.address(own.serve_contacts, _CONTACTS)
     if len(scene.broadphase.contact) > 0:
         scene.world.hooks[Hook.NEAR] = jit.address(list_near, _INT(_INT, _PTR))
-    fill(scene, only=set(Hook) - COMPLIANT - {Hook.CONTACTS, Hook.NEAR})
+    fill(scene, only=set(Hook) - COMPLIANT - OWN)
     hooks = {**shared.HOOKS, **own.HOOKS}
     if len(scene.sensors.id) > 0:
         from mbsim.dynamics.events.sensors import arrive_hook, happens_hook
@@ -249,4 +313,4 @@ def rigid_mechanism(system: System, fixed: bool, tol: float) -> Made:
             hooks["happens"] = happens_hook
     absent = {"check": 0, "inner": 0, "look": 0}
     problem = Problem(int(outer.ctypes.data), **(absent | addresses(hooks)))
-    return Made(problem, stepping, (inner, outer), tuple(found.said))
+    return Made(problem, stepping, (inner, outer, *tables), tuple(found.said))

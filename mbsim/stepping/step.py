@@ -1,6 +1,6 @@
 """One step of nonsmooth time stepping: the file to read first.
 
-    v_free = v + h M^-1 f(t, q, v)          forces as they are at the step's begin
+    v_free = v + h M^-1 f                   forces as they are within the step (`implicit`)
     v' = v_free + sum of M^-1 H' r          contacts by impulses r (`solver`)
     q' = q moved on for h by (1 - c) v' + c v
 
@@ -16,17 +16,14 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.hooks import Hook, Joints
+from mbsim.arrays.hooks import Hook
 from mbsim.arrays.scene import Scene
-from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
-from mbsim.dynamics.bodies.acceleration import accelerate
 from mbsim.dynamics.bodies.awake import bodies_awake, body_awake, graphic_awake, graphics_awake
 from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics, plane_travel
-from mbsim.dynamics.pipeline.evaluate import add_gravity
 from mbsim.stepping.arrays import (
     ALL_BODIES,
     ALL_POINTS,
@@ -47,6 +44,7 @@ from mbsim.stepping.arrays import (
     SLOP,
     SLOWEST,
     STEP_LENGTH,
+    THETA,
     UNSOLVED,
     W_NN,
     WOKEN,
@@ -61,6 +59,7 @@ from mbsim.stepping.displacements import (
     velocities_jump,
 )
 from mbsim.stepping.energy import keep_left, left_by_forces, left_by_spins
+from mbsim.stepping.forces import find_forces, find_motion
 from mbsim.stepping.free_motion import fill_motion
 from mbsim.stepping.friction import (
     coefficient,
@@ -72,6 +71,7 @@ from mbsim.stepping.friction import (
     let_yield,
     noise_of,
 )
+from mbsim.stepping.implicit import is_implicit, take_into_step
 from mbsim.stepping.kept import index_kept, recall
 from mbsim.stepping.near_pairs import FARTHER, list_anew
 from mbsim.stepping.one_point import apply, velocity_of
@@ -90,24 +90,6 @@ LET_GO = 100.0
 #: How often a step's contact problem is solved at most, each time with what bodies hit that the
 #: impulses threw at it.
 MOST_ATTEMPTS = 4
-
-
-@jitable
-def find_forces(scene: Scene, t: float, y: F1, dy: F1) -> int:
-    """Fill y' = f(t, y) without contacts; return 0 or why it cannot be."""
-    place_bodies(scene, y)
-    add_gravity(scene)
-    for k in range(BODY_SIZE * len(scene.bodies.mass), len(dy)):
-        dy[k] = 0.0
-    if scene.world.hooks[Hook.APPLIED] != 0:
-        code = call_int(scene.world.hooks[Hook.APPLIED], (scene, t, y, dy))
-        if code != 0:
-            return code
-    if not math.isfinite(accelerate(scene, y, dy)):
-        return Code.NOT_FINITE
-    if scene.world.hooks[Hook.JOINTS] != 0:
-        return call_int(scene.world.hooks[Hook.JOINTS], (scene, Joints.ACCELERATE, t, y, dy))
-    return 0
 
 
 @jitable
@@ -341,7 +323,8 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
         if not solved and let_jam(S, count, h, allowed):
             continue
         near = left_near_yield(S, count)
-        if near < allowed:
+        if near < 0.5 * allowed:
+            # not for what is less by rounding alone: tries are few
             allowed = near
             continue
         changed = let_meet(S, count, h)
@@ -379,25 +362,32 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
 
 @jitable
 def solve_by_middle(scene: Scene, S: Stepping, t: float, h: float, y: F1, committed: bool) -> int:
-    """Solve the step with forces and accelerations as they are in its midst; return 0 or a code.
+    """Solve the step with forces and accelerations as they are within it; return 0 or a code.
 
-    Where that is follows from the step with those of its begin: what rests then stays there.
+    That is in its midst, if forces are not stiff. Where that is follows from the step as it was
+    found so far: what rests then stays there.
     """
-    M, middle, dy = S.motion, S.motion.middle, S.motion.slope
+    M, middle, dy, theta = S.motion, S.motion.middle, S.motion.slope, S.forces.number[THETA]
     for k in range(BODY_SIZE * len(scene.bodies.mass), len(y)):
-        middle[k] = y[k] + 0.5 * h * dy[k]
+        middle[k] = y[k] + theta * h * dy[k]
     for k in range(bodies_awake(scene)):
         b = body_awake(scene, k)
         for c in range(6):
-            # of velocities alone: the displacement is that of `shift`
-            M.v[b, c] = 0.5 * (M.before[b, c] + M.v[b, c])
-    move_bodies(scene, S, y, 0.5 * h, middle)
-    code = find_forces(scene, t + 0.5 * h, middle, dy)
+            change = M.v[b, c] - M.before[b, c]
+            M.shift[b, c] += (theta - 0.5) * change
+            # the displacement is that of `shift` alone
+            M.v[b, c] = M.before[b, c] + theta * change
+    move_bodies(scene, S, y, theta * h, middle)
+    code = find_forces(scene, t + theta * h, middle, dy)
     wake_loaded(scene, S)
     if code != 0 or S.rest.count[WOKEN] == 1:
         return code
     place_bodies(scene, y)
     fill_motion(scene, S, y, h)
+    if is_implicit(S):
+        code = take_into_step(scene, S, h, dy, False)
+        if code != 0:
+            return code
     return solve_step(scene, S, h, committed)
 
 
@@ -438,11 +428,11 @@ def take_step(
         # once more where something wakes: with all that is awake then
         S.rest.count[WOKEN] = 0
         S.tally.count[ALL_BODIES] += bodies_awake(scene)
-        code = find_forces(scene, t, y, dy)
+        code = find_motion(scene, S, t, h, y)
         if code != 0:
             return code
-        wake_loaded(scene, S)
-        fill_motion(scene, S, y, h)
+        if S.rest.count[WOKEN] == 1:
+            continue
         if committed:
             index_kept(S)
             make_room(scene, S, y, h)

@@ -16,9 +16,8 @@ ABOUT_Y = ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0))
 DMAX = 1e-5  # m, of IMPACT's damper
 #: Our reference: STICTION's law and this method and tolerance.
 EXACT = ("RADAU5", 1e-8)
-#: Fixed steps of MOREAU [s]; its forces are explicit, so that a drive's damper allows no longer
-#: ones: about 2 I/d = 2.8 ms. Without one it finds them by error.
-STEPS = (2e-3, 1e-3, 5e-4)
+#: Fixed steps of MOREAU [s]; without one it finds them by error.
+STEPS = (1e-2, 5e-3, 2e-3, 1e-3)
 
 
 def _driven(k: int, link: Link) -> list[str]:

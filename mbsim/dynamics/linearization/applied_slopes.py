@@ -151,16 +151,20 @@ def add_scalar_slopes(scene: Scene, T: Tangent, t: float, y: F1, f: int) -> None
         add_two_sided(P, L.K, nb, bi, bj, by_x, u, u)
     if by_rate != 0.0:
         add_two_sided(P, L.D, nb, bi, bj, by_rate, u, u)
-        if not turns:
-            add_rate_by_pose(scene, T, f, u, by_rate, n)
-        if not line:
-            add_axis_rate(scene, T, f, by_rate, n, u, turns)
-        elif x > 0.0:
-            add_turning_rate(scene, T, y, f, by_rate, n, x, u)
+        if T.linear.stressed[0] == 1:
+            if not turns:
+                add_rate_by_pose(scene, T, f, u, by_rate, n)
+            if not line:
+                add_axis_rate(scene, T, f, by_rate, n, u, turns)
+            elif x > 0.0:
+                add_turning_rate(scene, T, y, f, by_rate, n, x, u)
     add_geometry(scene, T, y, f, -1 if line else scene.applied.axes[f], at_j)
     if line and x > 0.0:
         # the line turns: F/d across it
         tension = dot(vector(scene.work.applied[f]), n) / x
+        if T.linear.stressed[0] == 0:
+            # what pulls holds the line, what pushes lets it buckle
+            tension = min(tension, 0.0)
         a = cross(n, (1.0, 0.0, 0.0) if abs(n[0]) < 0.6 else (0.0, 1.0, 0.0))
         a = scale(1.0 / norm(a), a)
         for e in (a, cross(n, a)):

@@ -137,7 +137,7 @@ def fill_joint(scene: Scene, L: Linear, y: F1, k: int) -> None:
             U[q, i] = 0.0
     body, turn, q = tree.body[k], tree.turn[k], 0
     P = add(vector(L.r[body]), rotate(scene.work.R[body], vector(tree.child_p[k])))
-    if turn == TURN_ROOT:
+    if turn == TURN_ROOT or L.stressed[0] == 0:
         return
     if turn == TURN_AXIS:
         write_turn(U, 0, parent_axis(scene, k, 2), P, f, 0)
@@ -336,7 +336,7 @@ def among(scene: Scene, first: int, end: int, b: int) -> bool:
 def add_bends(scene: Scene, T: Tangent, t: float, y: F1) -> None:
     """Add how the forces of equations turn with the bodies that they are fixed to."""
     eq = scene.equations
-    for row in range(active_count(scene)):
+    for row in range(active_count(scene) if T.linear.stressed[0] == 1 else 0):
         e = eq.active[row]
         if eq.slot[e] >= 0:
             # incidents stay where they are

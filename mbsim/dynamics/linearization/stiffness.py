@@ -147,6 +147,8 @@ def add_geometry(scene: Scene, T: Tangent, y: F1, f: int, axes: int, at_j: int) 
 
     `at_j`: what acts on J does so at J's origin, not at I's.
     """
+    if T.linear.stressed[0] == 0:
+        return
     i, j = scene.applied.i[f], scene.applied.j[f]
     bi, bj = sides_of(scene, f)
     row = scene.work.applied[f]

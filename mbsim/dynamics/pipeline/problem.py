@@ -6,7 +6,7 @@ method asks for them. What a scene or a method lacks is not imported.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from mbsim.dynamics.pipeline.hooks import (
     difference,
     retract,
 )
+
+if TYPE_CHECKING:
+    from mbsim.compile_model.tangent import Depends, Tangent
 
 
 def mechanism(scene: Scene, fixed_step: bool = False) -> tuple[Problem, np.ndarray]:
@@ -64,6 +67,25 @@ def _find_slopes(scene: Scene) -> None:
     applied = scene.applied
     for f in np.flatnonzero(applied.form == WRENCH):
         applied.slopes[f] = slopes_address(int(applied.formula[f]))
+
+
+def linear_systems(
+    scene: Scene, depends: Depends, only: set[Hook]
+) -> tuple[dict[str, int], Tangent, Any]:
+    """Return what linearises, factors and solves, by names; and what must live with it.
+
+    Without geometric stiffness: the matrix is positive for any step. Hooks of derivatives are those
+    of `only`.
+    """
+    from mbsim.compile_model.tangent import make_tangent
+    from mbsim.dynamics.pipeline import implicit_hooks as of
+
+    tangent = make_tangent(scene, depends, False, stressed=False)
+    table = pack(tangent)
+    scene.world.hooks[Hook.TANGENT] = int(table.ctypes.data)
+    _find_slopes(scene)
+    fill(scene, Method(tangent), only)
+    return addresses(of.HOOKS), tangent, table
 
 
 def implicit_hooks(scene: Scene, problem: Problem, pair: bool) -> tuple[Problem, Any]:
