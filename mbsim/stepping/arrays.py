@@ -271,6 +271,13 @@ def at_rest(nb: int, nc: int, pairs: int, groups: int, side: I2) -> Rest:
     )
 
 
+def implicit_forces(n: int, nz: int) -> Forces:
+    """Return empty arrays for n numbers of y and the user's states: what is not known is stiff."""
+    number = np.array([1.0, math.inf])
+    y = [np.zeros(n) for _ in range(3)]
+    return Forces(number, y[0], np.zeros(4), y[1], y[2], np.zeros(nz))
+
+
 def make(
     rules: Rules, plan: Plan, side: I2, sizes: tuple[int, int, int, int, int, int, int, int]
 ) -> Stepping:
@@ -351,9 +358,5 @@ def make(
         np.zeros(TALLY_NUMBERS), whole(TALLY_COUNTS), numbers(nc, LOADS), whole(groups), numbers(nc)
     )
     tally.load[:, DUE] = 1.0
-    n = ny if plan.force[LINEARISE] != 0 else 0
-    # what is not known yet may be stiff
-    forces = Forces(
-        np.array([1.0, math.inf]), numbers(n), numbers(4), numbers(n), numbers(n), numbers(nz)
-    )
+    forces = implicit_forces(ny if plan.force[LINEARISE] != 0 else 0, nz)
     return Stepping(rules, plan, motion, points, kept, tally, rest, forces)

@@ -23,6 +23,7 @@ from mbsim.bench import parameters as p
 from mbsim.bench.daily import CHAIN, TRAIN
 from mbsim.bench.outcome import Outcome
 from mbsim.bench.peers import common
+from mbsim.bench.simbenchmark import BOUNCING, ELASTIC, PILE, Balls
 
 NAME = "ode"
 #: As ode_driver.c numbers shapes; numbers of a shape, and of a row of a body.
@@ -81,6 +82,7 @@ class Case(NamedTuple):
     sample: float = p.SAMPLE
     contacts: int = OF_SOLIDS  # most of a pair
     hinges: Sequence[Hinge] = ()
+    restitution: float = 0.0
     touch: bool = True  # shapes of two bodies do; else each touches fixed ones alone
 
 
@@ -160,7 +162,8 @@ def _numbers(case: Case, steps: common.Plan) -> Iterator[float]:
     """The scene as ode_driver.c reads it."""
     yield from (case.dt, steps.steps_per_row, steps.rows, case.sweeps)
     # as ODE's manual recommends: 0.2 of an error is taken back in a step; contacts hardly give
-    yield from (0.2, 1e-9, *case.gravity, case.mu, 0.0, 0.0, case.contacts, common.WALL_CAP)
+    yield from (0.2, 1e-9, *case.gravity, case.mu, case.restitution, 0.0)
+    yield from (case.contacts, common.WALL_CAP)
     yield float(case.touch)
     yield len(case.bodies)
     for body in case.bodies:
@@ -201,6 +204,9 @@ def _cases(scene: str) -> dict[str, Callable[[], Case]]:
         "bin_200": lambda: _bin(200, (5e-3, 2e-3, 1e-3)),
         "chain_box": _draped,
         "cylinder_train": _train,
+        "sb_bouncing": lambda: _balls(BOUNCING),
+        "sb_666": lambda: _balls(PILE),
+        "sb_666_elastic": lambda: _balls(ELASTIC),
         "drum_300": lambda: _drum(300, (5e-3, 2e-3, 1e-3, 5e-4)),
         "drum_3000": lambda: _drum(3000, (2e-3, 1e-3, 5e-4)),
     }
@@ -289,6 +295,19 @@ def _grains(count: int, dts: Sequence[float]) -> Cases:
         dts,
         (20,),
         lambda dt, sweeps: Case(dt, p.S7.end_time, sweeps, balls, shapes, p.S7.mu, sample=sample),
+    )
+
+
+def _balls(balls: Balls) -> Cases:
+    inertia = 0.4 * balls.mass * balls.radius**2
+    bodies = [Body(balls.mass, [inertia] * 3, at) for at in balls.centres().tolist()]
+    shapes = (FLOOR, *(Shape(k, SPHERE, (balls.radius,)) for k in range(len(bodies))))
+    yield from _each(
+        (1e-2, 5e-3, 1e-3),
+        (20,),
+        lambda dt, sweeps: Case(
+            dt, balls.end_time, sweeps, bodies, shapes, 0.0, restitution=balls.restitution
+        ),
     )
 
 
