@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
 #: Rounds in which a solver's goal is tightened where the error of the given problem is larger.
 ROUNDS = 4
+#: Coefficients, over those of a problem that stagnates, by way of which it is solved: rolling
+#: friction's where there is some, else friction's. The error of what is found is the problem's own.
+PATHS = ((0.8,), (0.5,), (2.0,), (0.5, 0.8), (1.5, 1.2))
 #: Share of the time allowed that looking for a proof may take.
 PROOF = 0.05
 #: What a solver leaves when it is late, in looks at an iterate: its last sweep and look, velocities
@@ -137,9 +140,36 @@ def solve(
         # that r = 0 happens to be near enough makes it no solution
         task.offer(r, error, error_q)
     result = _rounds(problem, solver, method, task, PROOF * max_seconds)
+    if guess is None and result.reason == "stagnates" and result.solver == "AUTO":
+        result = _by_continuation(result, began + max_seconds)
     result.solve_s = clock() - began
     result.condense_s = condensed - began if not plain else 0.0
     return result
+
+
+def _by_continuation(stuck: Result, end: float) -> Result:
+    """Solve a problem by way of others that differ in a coefficient alone; else return `stuck`.
+
+    From where a method goes round in a circle another problem's solution is a way out. `end`: by
+    the clock. Source: the homotopy in E. L. Allgower, K. Georg, Numerical Continuation Methods
+    (1990).
+    """
+    problem = stuck.problem
+    name = "mu" if problem.mu_r is None else "mu_r"
+    for path in PATHS:
+        found = stuck
+        for part in (*path, 1.0):
+            left = end - clock()
+            if left <= 0.0:
+                return stuck
+            other = replace(problem, **{name: part * getattr(problem, name)})
+            guess = Solution(found.u, found.r)
+            found = solve(other, stuck.tol, guess=guess, strict=stuck.strict, max_seconds=left)
+        if found.status == "solved":
+            found.problem, found.history = problem, stuck.history + found.history
+            found.iterations += stuck.iterations
+            return found
+    return stuck
 
 
 def _solve_plain(
@@ -174,6 +204,8 @@ def _solve_plain(
     task.offer(r, error, error_q)
     task.note("NSGS", history[:rows])
     result = _rounds(problem, "AUTO", named("AUTO"), task, PROOF * max_seconds)
+    if result.reason == "stagnates":
+        result = _by_continuation(result, began + max_seconds)
     result.solve_s = clock() - began
     return result
 

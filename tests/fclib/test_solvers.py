@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from helpers.fclib_folder import NAMES, problem_file
-from helpers.fclib_problems import some_local, wedge
+from helpers.fclib_problems import rolling_heap, some_local, wedge
 from mbsim.core import jit
 from mbsim.errors import ModelError
 from mbsim.fclib import clock, condensation, factor, hdf5, ordering
@@ -500,3 +500,16 @@ def test_no_solver_reads_memory_that_nothing_was_written_to(solver, make, monkey
         rows = [rows for _, rows in result.history]
         found.add((result.r.tobytes(), result.iterations, np.concatenate(rows).tobytes()))
     assert len(found) == 1
+
+
+@pytest.mark.parametrize(
+    ("seed", "mu", "mu_r"),
+    [(0, 0.3, 0.005), (1, 0.3, 0.001), (5, 0.8, 0.02), (7, 0.8, 0.0003), (9, 0.3, 0.0003)],
+)
+def test_heaps_of_spheres_that_hardly_roll_are_solved(seed, mu, mu_r):
+    # of the first and the fourth one AUTO's own methods go round in a circle
+    problem = rolling_heap(30, mu, mu_r, seed)
+    result = solve(problem, 1e-8)
+    assert result.status == "solved"
+    assert result.problem is problem
+    assert judge(problem, result.solution).error <= 1e-8

@@ -53,3 +53,52 @@ def dense(problem):
     v, r = h.T @ inverse @ g, g.T @ inverse @ g
     s = g.T @ inverse @ problem.f + problem.b
     return w - v @ np.linalg.solve(r, v.T), q - v @ np.linalg.solve(r, s)
+
+
+def rolling_heap(count, mu, mu_r, seed):
+    """Return a heap of spheres of 0.05 m after a step of 10 ms, with friction against rolling.
+
+    Contacts are where spheres of radii 0.7 to 1.3 times that touch, which were pushed apart from a
+    dense random place above the floor; velocities are at random.
+    """
+    rng = np.random.default_rng(seed)
+    radius = 0.05 * rng.uniform(0.7, 1.3, count)
+    side = 0.1 * (0.86 * count) ** (1.0 / 3.0)
+    x = rng.uniform(0.0, side, (count, 3))
+    first, second = np.triu_indices(count, 1)
+    wide = radius[first] + radius[second]
+    for _ in range(400):
+        x[:, 2] -= 1e-3
+        line = x[first] - x[second]
+        apart = np.linalg.norm(line, axis=1) + 1e-12
+        push = 0.4 * np.maximum(wide - apart, 0.0)[:, None] * line / apart[:, None]
+        np.add.at(x, first, push)
+        np.add.at(x, second, -push)
+        x[:, 2] = np.maximum(x[:, 2], radius)
+        x[:, :2] = np.clip(x[:, :2], 0.0, side)
+    line = x[first] - x[second]
+    apart = np.linalg.norm(line, axis=1)
+    touching = np.flatnonzero(apart < wide + 2e-3)
+    pairs = [(first[k], second[k], line[k] / apart[k]) for k in touching]
+    up = np.array([0.0, 0.0, 1.0])
+    pairs += [(k, -1, up) for k in range(count) if x[k, 2] < radius[k] + 2e-3]
+    h = np.zeros((6 * count, 5 * len(pairs)))
+    for k, (i, j, n) in enumerate(pairs):
+        across = np.linalg.svd(n[None])[2][1:]
+        axes = np.vstack([n, across])
+        for body, sign in ((i, 1.0), (j, -1.0)):
+            if body >= 0:
+                arm = -sign * radius[body] * n
+                h[6 * body : 6 * body + 3, 5 * k : 5 * k + 3] = sign * axes.T
+                h[6 * body + 3 : 6 * body + 6, 5 * k : 5 * k + 3] = sign * np.cross(arm, axes).T
+                h[6 * body + 3 : 6 * body + 6, 5 * k + 3 : 5 * k + 5] = sign * across.T
+    mass = 4000.0 * radius**3
+    inertia = 0.4 * mass * radius**2
+    weights = np.column_stack([mass, mass, mass, inertia, inertia, inertia]).ravel()
+    v = 0.05 * rng.normal(size=6 * count)
+    v[2::6] -= 0.0981
+    friction, rolling = np.full(len(pairs), mu), np.full(len(pairs), mu_r)
+    return Global(
+        5, matrix(np.diag(weights), "triplet"), matrix(h, "triplet"), weights * v,
+        np.zeros(h.shape[1]), friction, mu_r=rolling,
+    )  # fmt: skip

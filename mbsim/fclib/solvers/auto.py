@@ -59,8 +59,9 @@ MIDDLE = 1e-3
 #: Seconds of a Newton iteration in the contacts' impulses up to which it is not taken to the
 #: bodies' velocities: such problems are small, or chains.
 LIGHT = 2e-3
-#: Restarts without any gain after which there is nothing more to hope for.
-HOPELESS = 20
+#: Restarts without any gain after which there is nothing more to hope for: at all, and of rolling
+#: friction, where another coefficient finds the way (`solve`).
+HOPELESS, HOPELESS_ROLLING = 20, 4
 
 
 def first_sweeps(contacts: int) -> tuple[int, int]:
@@ -271,6 +272,7 @@ def _finish(task: Task) -> None:
     """
     start = chain = task.r
     vain = idle = 0
+    most = HOPELESS_ROLLING if task.blocks.rolling else HOPELESS
     spent = task.work
     for restart in count():
         rho, reach = RUNS[restart % len(RUNS)]
@@ -279,7 +281,7 @@ def _finish(task: Task) -> None:
         begin = run.error
         _proximal(task, run)
         vain = 0 if task.error < 0.9 * before else vain + 1
-        if task.over or vain >= HOPELESS:
+        if task.over or vain >= most:
             return
         idle = 0 if run.error < 0.5 * begin else idle + 1
         start = run.mean
