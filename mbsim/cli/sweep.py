@@ -81,7 +81,7 @@ def command(
                 scheduler=scheduler,
                 resume=resume,
                 progress=bar.update if bar else None,
-                notify=lambda line: warn([line]),
+                notify=lambda line: echo(f"mbsim: {line}", err=True),
             )
     finally:
         if bar:

@@ -33,6 +33,8 @@ _NEEDED = ("file", "signal", "column")
 TIME = "run time"
 #: Between cells of a CSV: the one that the line of names has most of.
 _DELIMITERS = ",;\t"
+#: The largest value of a record: squares of a million of them are added up.
+_LARGEST = 1e150
 #: Rows of a record: fewer say nothing, more are a mistake.
 _LEAST_ROWS, _MOST_ROWS = 3, 1_000_000
 
@@ -225,6 +227,19 @@ def read_columns(file: Path) -> Columns:
     return Columns(file, {name: table[:, k] for k, name in enumerate(names)})
 
 
+def _too_large(asked: Asked, x: Numbers, sd: Numbers | None) -> list[str]:
+    """Return that squares of values, over their noise, would overflow, where they would."""
+    root = math.sqrt(float(asked.table.get("weight", 1.0)))
+    column, largest = asked.table["column"], float(np.max(np.abs(x), initial=0.0))
+    if not largest <= _LARGEST:
+        said = f"column {column!r} has values up to {largest:.3g} in the model's units"
+    elif not max(1.0, largest) * root <= _LARGEST * (1.0 if sd is None else float(np.min(sd))):
+        said = f"values of column {column!r} are too large beside sd and weight"
+    else:
+        return []
+    return [f"{said}: squares above {_LARGEST:g} squared are no numbers; is the unit right?"]
+
+
 def read_record(asked: Asked, columns: Columns, factor: float, per_time: float) -> Record:
     """Return a record of a file that was read.
 
@@ -265,6 +280,8 @@ def read_record(asked: Asked, columns: Columns, factor: float, per_time: float) 
         faults.append("times must grow from row to row")
     if sd is not None and not np.all(sd[kept] > 0.0):
         faults.append(f"sd: {table['sd']}: must be above 0 in every row")
+    else:
+        faults += _too_large(asked, x[kept], None if sd is None else sd[kept])
     if faults:
         raise ModelError("\n".join(f"records.{asked.name}: {asked.file}: {f}" for f in faults))
     return Record(

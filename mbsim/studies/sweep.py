@@ -16,6 +16,7 @@ from mbsim.errors import DeckError, Interrupted, ModelError, ResultsError, Solve
 from mbsim.results.files import replace_text
 from mbsim.studies.journal import Journal, rows_kept
 from mbsim.studies.local import Workers
+from mbsim.studies.sizes import output_sizes
 from mbsim.studies.stopping import number_of
 from mbsim.studies.table import SUFFIX, Responses, need_pyarrow, write_table
 from mbsim.studies.uncertainty import SUFFIX as UNCERTAINTY
@@ -106,7 +107,7 @@ def sweep(
     if study.design == "saltelli":
         need_salib()
     count = len(study.points)
-    model = model_digest(study)
+    model, sizes = described(study)
     prepare_directory(folder, study.name)
     keys = [study.key(run, model) for run in range(count)]
     path = folder / f"{study.name}.rows"
@@ -115,6 +116,8 @@ def sweep(
     same = {key: run for run, key in reversed(list(enumerate(keys)))}
     left = sorted(run for run in same.values() if run not in found)
     kept = len(found)
+    if resume and notify is not None:
+        notify(f"{path}: {kept} of {len(same)} runs are kept, {len(left)} are left to do")
     if progress is not None:
         progress(kept, len(same))
     try:
@@ -139,7 +142,8 @@ def sweep(
     reasons, warnings = _reasons(rows, FAILED), _reasons(rows, WARNED)
     if counts[FAILED] == count:
         raise SolverError(f"{table}: not one of {count} runs came to its end: {reasons[0][1]}")
-    return Swept(table, dict(counts), kept, reasons, warnings, _write_uncertainty(study, table))
+    about = _write_uncertainty(study, table, sizes)
+    return Swept(table, dict(counts), kept, reasons, warnings, about)
 
 
 def _reasons(rows: Sequence[Row], status: str) -> list[tuple[int, str]]:
@@ -148,10 +152,12 @@ def _reasons(rows: Sequence[Row], status: str) -> list[tuple[int, str]]:
     return [(number, why) for why, number in found]
 
 
-def _write_uncertainty(study: Study, table: Path) -> dict[str, Any] | None:
+def _write_uncertainty(
+    study: Study, table: Path, sizes: Mapping[str, float]
+) -> dict[str, Any] | None:
     """Write bands and indices beside the table; of a study without them, remove older ones."""
     path = table.with_name(f"{study.name}{UNCERTAINTY}")
-    about = uncertainty(study, Responses(table))
+    about = uncertainty(study, Responses(table), sizes)
     if about is None:
         with suppress(OSError):
             path.unlink()
@@ -195,8 +201,8 @@ def write_run(study: Study, run: int, folder: Path) -> Row:
     return run_one(study, study.case(run), folder / f"run-{run}")
 
 
-def model_digest(study: Study) -> str:
-    """Return the digest of a study's deck and of all files that it names.
+def described(study: Study) -> tuple[str, Mapping[str, float]]:
+    """Return the digest of a study's deck and of all files that it names, and outputs' sizes.
 
     Raises
     ------
@@ -222,7 +228,7 @@ def model_digest(study: Study) -> str:
     others = {name: fact for name, fact in facts["model"].items() if fold(name) not in changed}
     about = [system.model.sha256, others, facts["subroutines"]]
     text = json.dumps(about, sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return hashlib.sha256(text.encode()).hexdigest(), output_sizes(study, system)
 
 
 def checked_system(study: Study, changes: Mapping[str, str]) -> tuple[System, Settings]:

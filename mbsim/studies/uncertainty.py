@@ -7,7 +7,7 @@ errors are those of independent points; a Latin hypercube's and Sobol's sequence
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
@@ -17,12 +17,15 @@ from mbsim import __version__
 from mbsim.errors import ModelError
 from mbsim.studies.designs import SAMPLED, block_length
 from mbsim.studies.distributions import Numbers
+from mbsim.studies.formulas import Formula
 
 if TYPE_CHECKING:
     from mbsim.studies.study import Study
     from mbsim.studies.table import Responses
 
 SUFFIX = ".uncertainty.json"
+#: How the reason begins of an output that varies by rounding only.
+NOT_SEEN = "not seen"
 #: Parts of all runs below the quantiles of a band.
 PARTS = (0.05, 0.5, 0.95)
 #: Indices have converged where no 95 % interval is wider than this: Sarrazin, Pianosi & Wagener,
@@ -30,8 +33,13 @@ PARTS = (0.05, 0.5, 0.95)
 NARROW = 0.05
 #: Resamplings that intervals of indices are made of, SALib's own choice.
 _RESAMPLES = 100
-#: How much outputs of several runs differ at least, over their size: below it is rounding.
+#: How much outputs of several runs differ at least, over their size: below it is rounding, of each
+#: step, which add up.
 _ROUNDING = 64.0 * float(np.finfo(np.float64).eps)
+#: An output that varies by less than this part of its size may vary by rounding that something
+#: stiff has made larger: it does where its indices are those of noise, which no parameter alone
+#: explains and each alone makes anew.
+_SMALL, _NONE, _ALL = 1e-6, 0.1, 0.9
 
 
 def need_salib() -> None:
@@ -40,11 +48,13 @@ def need_salib() -> None:
         raise ModelError('Sobol indices need: pip install "mbsim-contact[studies]"')
 
 
-def uncertainty(study: Study, table: Responses) -> dict[str, Any] | None:
+def uncertainty(
+    study: Study, table: Responses, sizes: Mapping[str, float] | None = None
+) -> dict[str, Any] | None:
     """Return bands and Sobol indices of a study's scalar outputs, for JSON.
 
     None of a study whose design draws from no distributions. What there is no number for is None,
-    with a ``reason`` beside it.
+    with a ``reason`` beside it. `sizes` are those of `sizes.output_sizes`.
     """
     if study.design not in SAMPLED or not table.outputs:
         return None
@@ -56,10 +66,30 @@ def uncertainty(study: Study, table: Responses) -> dict[str, Any] | None:
         "bands": {name: bands(independent(study, table[name])) for name in table.outputs},
     }
     if study.design == "saltelli":
-        found["indices"] = {
-            name: sobol_indices(table[name], table.parameters, study.seed) for name in table.outputs
-        }
+        found["indices"] = _indices(study, table, sizes or {})
     return found
+
+
+def _indices(study: Study, table: Responses, sizes: Mapping[str, float]) -> dict[str, Any]:
+    """Return Sobol indices by output."""
+    steps = int(np.max(table["steps"], initial=1))
+    formulas = {output.name: output.formula for output in study.outputs if output.formula}
+    found: dict[str, Any] = {}
+    for name in table.outputs:
+        size = sizes.get(name, 0.0)
+        each = sobol_indices(table[name], table.parameters, study.seed, size, steps)
+        if name in formulas and "reason" not in each:
+            known = {*table.parameters, *table.outputs}
+            used = Formula(formulas[name], known).names & known
+            if used and all(_is_unseen(found.get(other, {})) for other in used):
+                each = {"reason": f"{NOT_SEEN}: it is made of {', '.join(sorted(used))}"}
+        found[name] = each
+    return found
+
+
+def _is_unseen(index: Mapping[str, Any]) -> bool:
+    """Return whether an output has no indices because it varies by rounding."""
+    return str(index.get("reason", "")).startswith(NOT_SEEN)
 
 
 def independent(study: Study, values: Numbers) -> Numbers:
@@ -124,7 +154,9 @@ def _interval(x: Numbers, part: float) -> list[float] | None:
     return [float(x[low - 1]), float(x[high])] if low > 0 and high < len(x) else None
 
 
-def sobol_indices(values: Numbers, parameters: Sequence[str], seed: int) -> dict[str, Any]:
+def sobol_indices(
+    values: Numbers, parameters: Sequence[str], seed: int, size: float = 0.0, steps: int = 1
+) -> dict[str, Any]:
     """Return first-order and total Sobol indices of an output of a Saltelli design, by SALib.
 
     Saltelli et al., Comput. Phys. Commun. 181 (2010) 259-270; intervals by the bootstrap.
@@ -137,6 +169,10 @@ def sobol_indices(values: Numbers, parameters: Sequence[str], seed: int) -> dict
         The p names.
     seed : int
         Of the bootstrap.
+    size : float
+        Of the output's quantity in the model, where it is known.
+    steps : int
+        Of the longest run: rounding of each adds to that of the others.
 
     Returns
     -------
@@ -153,9 +189,16 @@ def sobol_indices(values: Numbers, parameters: Sequence[str], seed: int) -> dict
     missing = int(np.sum(~np.isfinite(values)))
     if missing:
         return {"reason": f"{missing} of {len(values)} runs have no value; the design needs all"}
-    scaled = values / (float(np.max(np.abs(values))) or 1.0)
-    if np.ptp(scaled) <= _ROUNDING:
+    largest = float(np.max(np.abs(values))) or 1.0
+    scaled = values / largest
+    spread, usual = float(np.ptp(scaled)), max(1.0, size / largest)
+    if spread <= _ROUNDING:
         return {"reason": "all runs have the same value"}
+    if spread <= _ROUNDING * steps * usual:
+        return {
+            "reason": f"{NOT_SEEN}: runs differ by {spread * largest:.2g}, which rounding of "
+            f"{steps} steps makes of {usual * largest:.2g}"
+        }
     need_salib()
     from SALib.analyze import sobol
 
@@ -165,6 +208,12 @@ def sobol_indices(values: Numbers, parameters: Sequence[str], seed: int) -> dict
         problem, scaled, calc_second_order=False, num_resamples=_RESAMPLES, seed=seed + 1
     )
     columns = {"first": "S1", "first_95": "S1_conf", "total": "ST", "total_95": "ST_conf"}
+    alone, together = found["S1"], found["ST"]
+    if spread <= _SMALL * usual and np.max(alone) <= _NONE and np.min(together) >= _ALL:
+        return {
+            "reason": f"{NOT_SEEN}: runs differ by {spread * largest:.2g} of {usual * largest:.2g} "
+            "as noise does: no parameter alone explains a tenth of it, each alone changes it"
+        }
     widest = 2.0 * float(max(np.max(found["S1_conf"]), np.max(found["ST_conf"])))
     return {
         "parameters": {

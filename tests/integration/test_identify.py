@@ -195,6 +195,27 @@ def test_the_command(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
+    ("factor", "sd", "said"),
+    [
+        (1e300, "", "column 'x' has values up to 1e+300 in the model's units"),
+        (1e308, "sd = 1e300", "column 'x' has values up to 1e+308 in the model's units"),
+        (1.0, "sd = 1e-200", "values of column 'x' are too large beside sd and weight"),
+        (0.0, "sd = 1e-200", "values of column 'x' are too large beside sd and weight"),
+        (1e10, "weight = 1e300", "values of column 'x' are too large beside sd and weight"),
+    ],
+)
+def test_values_whose_squares_overflow_are_refused(tmp_path, monkeypatch, factor, sd, said):
+    monkeypatch.chdir(tmp_path)
+    t = np.linspace(0.0, 6.0, 61)
+    write_record(tmp_path / "x.csv", t, factor * np.cos(t))
+    asked = {"mu_static": "start = 0.98, low = 0.5, high = 2"}
+    (tmp_path / "belt.toml").write_text(text_of(BELT, asked, BELT_SETS, sd))
+    found = CliRunner().invoke(main, ["identify", "belt.toml", "--workers", "1"])
+    assert found.exit_code == 2, found.output
+    assert f"records.x: x.csv: {said}" in found.stderr
+
+
+@pytest.mark.parametrize(
     ("end", "code", "said"),
     [
         (KeyboardInterrupt, 130, "interrupted: "),

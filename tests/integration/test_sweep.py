@@ -27,7 +27,7 @@ from mbsim.studies.journal import Journal, rows_kept
 from mbsim.studies.local import MOST_TRIES, Workers
 from mbsim.studies.stopping import Stop, number_of, stoppable
 from mbsim.studies.study import read_study
-from mbsim.studies.sweep import model_digest, sweep
+from mbsim.studies.sweep import described, sweep
 from mbsim.studies.table import Responses, write_table
 from mbsim.studies.uncertainty import sobol_indices
 from mbsim.studies.worker import PoolLost, failed
@@ -96,7 +96,7 @@ def test_the_table_is_the_same_for_any_number_of_workers_and_when_one_is_killed(
             busy = next(w for w in workers._workers if w.runs)
             os.kill(busy.process.pid, signal.SIGKILL)
     assert workers.died == 2
-    keys = [study.key(run, model_digest(study)) for run in range(40)]
+    keys = [study.key(run, described(study)[0]) for run in range(40)]
     write_table(tmp_path / "killed.parquet", study, keys, [rows[run] for run in range(40)])
     assert (tmp_path / "killed.parquet").read_bytes() == one
 
@@ -138,7 +138,7 @@ def test_a_broken_study_goes_on_where_it_was(tmp_path):
     assert done[0] == (7, 12)
     assert done[-1] == (12, 12)
     assert swept.table.read_bytes() == whole
-    keys = {study.key(run, model_digest(study)): run for run in range(12)}
+    keys = {study.key(run, described(study)[0]): run for run in range(12)}
     assert sorted(rows_kept(journal, keys)) == list(range(12))
 
 
@@ -152,7 +152,7 @@ def test_rows_of_other_runs_are_not_taken(tmp_path):
         STUDY.replace("at = 0.02", "at = 0.03"),
     ):
         other = read_study(study_file(tmp_path, text))
-        keys = {other.key(run, model_digest(other)): run for run in range(12)}
+        keys = {other.key(run, described(other)[0]): run for run in range(12)}
         assert rows_kept(tmp_path / "out" / "ball.rows", keys) == {}, text
     # a longer study of the same seed may have some of them
     more = read_study(study_file(tmp_path, STUDY.replace("latin_hypercube", "sobol"), runs=8))
@@ -167,11 +167,11 @@ def test_a_deck_or_script_that_changes_makes_other_runs(tmp_path):
     deck = MODEL.read_text().replace("../userfuncs/coulomb_stribeck.py", "own.py")
     (tmp_path / "ball.xml").write_text(deck)
     study = read_study(study_file(tmp_path, model="ball.xml"))
-    found = {model_digest(study)}
+    found = {described(study)[0]}
     (tmp_path / "own.py").write_text(script + "\n# changed\n")
-    found.add(model_digest(study))
+    found.add(described(study)[0])
     (tmp_path / "ball.xml").write_text(deck.replace('mass="5"', 'mass="6"'))
-    found.add(model_digest(study))
+    found.add(described(study)[0])
     assert len(found) == 3
 
 
@@ -351,6 +351,48 @@ def test_bands_and_sobol_indices_beside_the_table(tmp_path, monkeypatch):
     assert missing > 0
     assert f"no Sobol indices of late: {missing} of 128 runs have no value" in found.output
     assert re.search(r"^depth +k +[01]\.\d+", found.output, re.MULTILINE)
+
+
+def test_resume_says_what_is_kept_and_what_is_left(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    few, more = study_file(tmp_path, runs=5), tmp_path / "more"
+    more.mkdir()
+    runner, how = CliRunner(), ["-o", "out", "--workers", "1"]
+    found = runner.invoke(main, ["sweep", str(few), *how])
+    assert "kept" not in found.stderr
+    rows = tmp_path / "out" / "ball.rows"
+    lines = rows.read_bytes().splitlines(keepends=True)
+    rows.write_bytes(b"".join(lines[:-2]))
+    found = runner.invoke(main, ["sweep", str(few), *how, "--resume"])
+    assert found.exit_code == 0, found.output
+    assert "mbsim: out/ball.rows: 3 of 5 runs are kept, 2 are left to do\n" in found.stderr
+    found = runner.invoke(main, ["sweep", str(few), *how, "--resume"])
+    assert "5 of 5 runs are kept, 0 are left to do" in found.stderr
+
+
+def test_what_varies_by_rounding_only_has_no_indices(tmp_path, monkeypatch):
+    pytest.importorskip("SALib")
+    monkeypatch.chdir(tmp_path)
+    # thrown along y of a marker that a right angle has turned: straight on but for rounding
+    text = STUDY.replace("latin_hypercube", "saltelli").replace(', scale = "log"', "")
+    text += 'aside = {{ signal = "bodies/2/position/y" }}\n'
+    text += 'twice = {{ formula = "2*aside" }}\nboth = {{ formula = "aside + x" }}\n'
+    deck = MODEL.read_text().replace("../userfuncs", str(MODEL.parents[1] / "userfuncs"))
+    deck = deck.replace('v_ic_x="5" v_ic_x_flag', 'vm_id="11" v_ic_y="5" v_ic_y_flag')
+    turned = '<Reference_Marker id="11" body_id="1" psi="-1.5707963267948966"/>'
+    deck = deck.replace('<Reference_Marker id="20"', f'{turned}<Reference_Marker id="20"')
+    (tmp_path / "bowling_ball.xml").write_text(deck)
+    file = study_file(tmp_path, text, runs=16 * 4, end=0.1, model=tmp_path / "bowling_ball.xml")
+    found = CliRunner().invoke(main, ["sweep", str(file), "--workers", "1"])
+    assert found.exit_code == 0, found.output
+    table = Responses(tmp_path / "ball" / "ball.parquet")
+    assert 0.0 < np.ptp(table["aside"]) < 1e-12
+    about = json.loads((tmp_path / "ball" / "ball.uncertainty.json").read_text())["indices"]
+    assert about["aside"]["reason"].startswith("not seen: runs differ by ")
+    assert about["twice"]["reason"] == "not seen: it is made of aside"
+    assert "parameters" in about["both"]
+    assert "parameters" in about["x"]
+    assert "no Sobol indices of aside: not seen: " in found.output
 
 
 def free_port():

@@ -32,6 +32,7 @@ def saltelli(blocks, seed=5, spread=FLAT):
         seed=seed,
         spreads=dict.fromkeys(NAMES, spread),
         runs=5 * blocks,
+        outputs=(),
     )
 
 
@@ -42,7 +43,7 @@ def table(**columns):
         def __len__(self):
             return len(next(iter(self.values())))
 
-    return Table(columns)
+    return Table(columns, steps=np.full(len(next(iter(columns.values()))), 500))
 
 
 def test_indices_are_those_that_ishigami_and_homma_give():
@@ -133,6 +134,26 @@ def test_indices_do_not_depend_on_units_and_are_the_same_each_time():
     for unit in (2.0**-900, 2.0**900):
         assert sobol_indices(unit * (a + 2.0 * b), NAMES, 0) == first
     assert bands(2.0**900 * a)["sd"] == 2.0**900 * bands(a)["sd"]
+
+
+def test_what_varies_by_rounding_is_not_seen():
+    pytest.importorskip("SALib")
+    study = saltelli(64)
+    a, b, _ = designs.saltelli(study).T
+    steps = 1000
+    bound = 64.0 * 2.0**-52 * steps
+    # beside what the model's quantities are, and beside its own size
+    assert "not seen" in sobol_indices(0.1 * bound * a, NAMES, 0, 1.0, steps)["reason"]
+    assert "not seen" in sobol_indices(1.0 + 0.1 * bound * a, NAMES, 0, 0.0, steps)["reason"]
+    # small numbers of which nothing says how large they should be, and what is well above rounding
+    assert "parameters" in sobol_indices(0.1 * bound * a, NAMES, 0, 0.0, steps)
+    assert "parameters" in sobol_indices(1.0 + 100.0 * bound * a, NAMES, 0, 1.0, steps)
+    # rounding that something stiff makes larger: noise, far above the bound
+    noise = np.random.default_rng(1).standard_normal(len(a))
+    assert "as noise does" in sobol_indices(1.0 + 1e-9 * noise, NAMES, 0, 0.0, steps)["reason"]
+    # the same of a tenth of the size is a chaotic output, which varies; a sum is no noise
+    assert "parameters" in sobol_indices(1.0 + 0.1 * noise, NAMES, 0, 0.0, steps)
+    assert "parameters" in sobol_indices(1.0 + 1e-9 * (a + b), NAMES, 0, 0.0, steps)
 
 
 def test_only_draws_count_as_independent():
