@@ -72,6 +72,10 @@ def command(
     contacts/301/force/mag, requests/3/F2 or energy/kinetic. Without /x, /y, /z or /mag a vector
     gives all its components; 'bodies/*/velocity/mag' (in quotes) all bodies. Several result
     files are drawn over each other, in the units of the first.
+
+    Of a run with --sensitivity, 'sensitivity/Body_Rigid[2].mass/bodies/2/position/z' (in quotes) is
+    the derivative of that signal by that parameter; a line across the panel marks the time from
+    which it is not known.
     """
     from mbsim.cli.messages import print_json, warn
     from mbsim.errors import ModelError
@@ -192,6 +196,7 @@ def _drawn(picture: Picture, target: Path) -> dict[str, object]:
             {
                 "quantity": panel.quantity.name,
                 "unit": panel.unit,
+                **({"known_until": panel.until} if panel.until else {}),
                 "curves": [
                     {
                         "file": picture.files[curve.file],

@@ -5,6 +5,7 @@ Only numbers and words: `results.drawing` makes a picture of it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,7 +15,7 @@ import numpy as np
 
 from mbsim.errors import ModelError, ResultsError, UnknownSignal
 from mbsim.results.elements import GROUPS
-from mbsim.results.names import PARTS
+from mbsim.results.names import PARTS, of_slope
 from mbsim.results.quantities import quantity_of
 from mbsim.results.units import TIME, Quantity, UnitSystem
 
@@ -78,6 +79,8 @@ class Panel:
     axis: str = ""
     #: What this panel is drawn over, where it has an axis of its own.
     over: str = ""
+    #: Until when derivatives are known that are not to the end: what is said of each, and the time.
+    until: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass
@@ -107,8 +110,9 @@ class Component:
     @property
     def column(self) -> int:
         """Return the column; 0 for a magnitude, which is of the first one's kind."""
+        is_request = of_slope(self.dataset)[1].startswith("requests/")
         for parts in PARTS.values():
-            if self.part in parts and self.dataset.startswith("requests/") == (len(parts) == 8):
+            if self.part in parts and is_request == (len(parts) == 8):
                 return parts[self.part]
         return 0
 
@@ -323,10 +327,32 @@ def _add_component(picture: Picture, k: int, track: _Track, component: Component
     values = track.values(component, quantity)
     band = track.band(component, quantity)
     panel.curves.append(Curve(k, component.name, label, track.x, values, band))
+    _add_until(picture, k, track, component, panel)
+
+
+def _add_until(picture: Picture, k: int, track: _Track, component: Component, panel: Panel) -> None:
+    """Say until when a derivative is known, where that is not to the end."""
+    parameter, _ = of_slope(component.dataset)
+    about = track.results.parameters.get(parameter, {})
+    until = float(about.get("known_until", math.inf))
+    if not math.isfinite(until):
+        return
+    until *= track.from_units.factor_to(track.units, TIME)
+    run = f"{picture.files[k]}: " if len(picture.files) > 1 else ""
+    time = f"{until:.6g} {track.units.text(TIME)}".rstrip()
+    note = f"{run}derivatives by {parameter} are not known from {time} on: {about.get('why', '')}"
+    if note not in picture.notes:
+        picture.notes.append(note)
+    if track.over_time:
+        panel.until[f"{run}{parameter} known until {time}"] = until
 
 
 def label_of(results: Results, component: Component) -> str:
     """Return what a curve is called: ``body 2 (ball), z``."""
+    parameter, signal = of_slope(component.dataset)
+    if parameter:
+        plain = label_of(results, Component(component.name, signal, component.part))
+        return f"{plain} by {parameter}"
     group, *rest = component.dataset.split("/")
     part = {"mag": "magnitude"}.get(component.part, component.part)
     if group not in _ONE_OF or not rest:

@@ -224,7 +224,7 @@ def _fill(axis: Axes, picture: Picture, panel: Panel) -> None:
         # above the ticks, where the legend does not reach
         axis.yaxis.get_offset_text().set_horizontalalignment("right")
     axis.set_ylabel(_plain(panel.axis))
-    lines += _marks(axis, picture)
+    lines += _marks(axis, picture, panel)
     _legend(axis, picture, panel, lines)
 
 
@@ -308,34 +308,45 @@ def _number_decades(axis: Axes) -> None:
         axis.grid(which="minor", axis="y", linewidth=0.4)
 
 
-def _marks(axis: Axes, picture: Picture) -> list[Line2D]:
-    """Draw events as faint lines across the panel; return samples for the legend."""
+def _marks(axis: Axes, picture: Picture, panel: Panel) -> list[Line2D]:
+    """Draw events, and until when derivatives are known, as lines across the panel.
+
+    Returns
+    -------
+    list of Line2D
+        Samples for the legend.
+    """
     from matplotlib.lines import Line2D
 
-    samples = []
-    for kind, times in picture.events.items():
-        dashes = _EVENT_DASHES.get(kind, (0, (6, 2, 1, 2)))
+    def across(times: Any, colour: str, dashes: Any, width: float) -> Line2D:
         axis.vlines(
             times,
             0.0,
             1.0,
             transform=axis.get_xaxis_transform(),
-            colors="0.6",
+            colors=colour,
             linestyles=dashes,
-            linewidths=0.7,
+            linewidths=width,
             zorder=0.9,
         )
-        samples.append(Line2D([], [], color="0.6", linestyle=dashes, linewidth=0.9))
+        return Line2D([], [], color=colour, linestyle=dashes, linewidth=width + 0.2)
+
+    samples = []
+    for k, until in enumerate(panel.until.values()):
+        samples.append(across(until, _RED, _DASHES[(k + 1) % len(_DASHES)], 0.9))
+    for kind, times in picture.events.items():
+        samples.append(across(times, "0.6", _EVENT_DASHES.get(kind, (0, (6, 2, 1, 2))), 0.7))
     return samples
 
 
 def _entries(picture: Picture, panel: Panel) -> list[str]:
-    """Return the texts of a panel's legend: curves; in the first one also kinds of events."""
+    """Return the texts of a panel's legend: curves, marks; in the first also kinds of events."""
     several = len(picture.files) > 1
     texts = [
         f"{picture.files[curve.file]}: {curve.label}" if several else curve.label
         for curve in panel.curves
     ]
+    texts += panel.until
     if panel is not picture.panels[0]:
         return texts
     return texts + [f"{kind} ({len(times)})" for kind, times in picture.events.items()]

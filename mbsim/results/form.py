@@ -22,9 +22,11 @@ _EVENT = ("time", "kind")
 #: What a group says of its elements, beside their signals.
 FACTS = ("id", "label", "type")
 #: Groups of other things than elements.
-NO_ELEMENTS = tuple("checkpoint stats audit state energy requests graphics linear".split())
+NO_ELEMENTS = tuple(
+    "checkpoint stats audit state energy requests graphics linear sensitivity".split()
+)
 #: Datasets that are no signals, whatever their shapes.
-NO_SIGNALS = ("state/", "contact_points/", "errors/", "sensitivity/", "linear/")
+NO_SIGNALS = ("state/", "contact_points/", "errors/", "linear/")
 #: What is no key: what a run goes on from, and what pictures are made of.
 NO_KEYS = ("checkpoint/", "graphics/", "markers", "connections")
 

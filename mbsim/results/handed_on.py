@@ -70,7 +70,7 @@ def pandas_frame(results: Results, names: Sequence[str]) -> pandas.DataFrame:
                 read = {each.dataset: results[each.dataset]}
             values = read[each.dataset]
             if each.part == "mag":
-                columns[each.name] = np.linalg.norm(values, axis=1)
+                columns[each.name] = results[each.name]
             else:
                 columns[each.name] = values[:, each.column] if each.part else values
             units[each.name] = system.text(quantity_of(results, each.dataset, each.column))

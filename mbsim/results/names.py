@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 
@@ -12,8 +13,20 @@ PARTS: dict[int, dict[str, int]] = {
     4: {"w": 0, "x": 1, "y": 2, "z": 3},
     8: {f"F{k}": k - 1 for k in range(1, 9)},
 }
+#: How names of derivatives begin: ``sensitivity/<parameter>/<signal>``.
+SENSITIVITY = "sensitivity/"
+#: An element's id in the name of a parameter, ``Body_Rigid[2].mass``, is no wildcard.
+_ID = re.compile(r"\[(\d+)\](?=\.)")
 #: Most ids that a compact name spells out; more are ``*``.
 _SPELLED = 6
+
+
+def of_slope(name: str) -> tuple[str, str]:
+    """Return parameter and signal of a derivative's name; of another signal itself, and no name."""
+    if not name.startswith(SENSITIVITY):
+        return "", name
+    parameter, _, signal = name[len(SENSITIVITY) :].partition("/")
+    return parameter, signal
 
 
 def parts_of(columns: int) -> tuple[str, ...]:
@@ -28,7 +41,7 @@ def order(name: str) -> list[tuple[int, int, str]]:
 
 def is_pattern(name: str) -> bool:
     """Return whether a name has wildcards: ``*``, ``?`` or ``[...]``."""
-    return any(character in name for character in "*?[")
+    return any(character in _ID.sub("", name) for character in "*?[")
 
 
 def matching(pattern: str, columns: Mapping[str, int]) -> list[str]:
@@ -41,7 +54,7 @@ def matching(pattern: str, columns: Mapping[str, int]) -> list[str]:
     columns : mapping of str to int
         Names of signals and how many columns each has.
     """
-    wanted = pattern.strip("/").split("/")
+    wanted = _ID.sub(r"[[]\1]", pattern.strip("/")).split("/")
     found = []
     for name in sorted(columns, key=order):
         segments = name.split("/")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mbsim.model.request_types import TYPES
-from mbsim.results.names import PARTS
+from mbsim.results.names import PARTS, of_slope
 from mbsim.results.requests import measures_of
 from mbsim.results.units import (
     ACCELERATION,
@@ -60,6 +62,9 @@ _BY_MEASURE = {
 
 def quantity_of(results: Results, dataset: str, column: int = 0) -> Quantity:
     """Return what a column of a signal measures; of an unknown one a quantity of its name."""
+    parameter, signal = of_slope(dataset)
+    if parameter:
+        return by_parameter(quantity_of(results, signal, column), parameter)
     group, _, last = dataset.rpartition("/")
     if group == "requests":
         kind = str(results.attribute(dataset, "type") or "")
@@ -71,6 +76,44 @@ def quantity_of(results: Results, dataset: str, column: int = 0) -> Quantity:
         last = f"request {last}"
     known = _BY_NAME.get(last)
     return known or Quantity(last.replace("_", " ").capitalize())
+
+
+#: A power in the unit of an attribute, as statements declare it: ``F T/L``, ``M L^2``.
+_POWER = re.compile(r"(F|L|T|rad|M)(?:\^(\d))?")
+_BASES = {"F": "force", "L": "length", "T": "time", "rad": "angle", "M": "mass"}
+
+
+def by_parameter(quantity: Quantity, parameter: str) -> Quantity:
+    """Return what the derivative of a quantity by a parameter of the deck measures."""
+    attribute = parameter.rpartition(".")[2]
+    name, powers = f"{quantity.name} by {attribute}", _powers_of(parameter)
+    if powers is None:
+        return replace(quantity, name=name, per=attribute)
+    below = {base: getattr(quantity, base) - power for base, power in powers.items()}
+    return replace(quantity, name=name, **below)
+
+
+def _powers_of(parameter: str) -> dict[str, int] | None:
+    """Return the powers in the unit of an attribute, None where it follows from something else."""
+    from mbsim.reader.keywords import fold
+    from mbsim.reader.statements import BY_KEY
+
+    element, _, attribute = parameter.rpartition(".")
+    statement = BY_KEY.get(fold(element.partition("[")[0]))
+    declared = statement.spec_names.get(fold(attribute)) if statement is not None else None
+    if statement is None or declared is None:
+        return None
+    spec = statement.attributes[declared]
+    if not spec.unit:
+        return {} if spec.kind.allowed.startswith("a number") else None
+    powers = dict.fromkeys(_BASES.values(), 0)
+    for sign, part in zip((1, -1), spec.unit.split("/"), strict=False):
+        for word in part.split():
+            found = _POWER.fullmatch(word)
+            if found is None:  # as of a stiffness that goes with an exponent
+                return None
+            powers[_BASES[found[1]]] += sign * int(found[2] or 1)
+    return powers
 
 
 #: Signals of several columns; and what may follow the name of such a one.

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,14 +16,10 @@ from mbsim.results.damage import DAMAGE, reads, said_of
 from mbsim.results.error_reading import Errors
 from mbsim.results.form import (
     FACTS,
-    NO_ELEMENTS,
-    NO_KEYS,
-    NO_SIGNALS,
     check_members,
     facts_of,
     is_dataset,
     is_group,
-    is_signal,
     last_row,
     plain,
     text_of,
@@ -34,6 +30,7 @@ from mbsim.results.linear import WithLinear
 from mbsim.results.mapping import SignalMapping
 from mbsim.results.names import (
     PARTS,
+    SENSITIVITY,
     by_label,
     compact,
     is_pattern,
@@ -44,6 +41,7 @@ from mbsim.results.names import (
 )
 from mbsim.results.opening import opened_file
 from mbsim.results.sensitivities import WithSensitivities
+from mbsim.results.signal_index import Location, SignalIndex
 
 if TYPE_CHECKING:
     import h5py
@@ -51,15 +49,6 @@ if TYPE_CHECKING:
 
 #: A column of a run's .csv, and how names for `mbsim request` begin.
 _CSV_COLUMN, _OF_REQUEST = re.compile(r"(\d+)\.(F[1-8])"), re.compile(r"Force_Contact\[\d+\]\.")
-
-
-class Location(NamedTuple):
-    """Where a signal is stored: its dataset, and its column among elements side by side."""
-
-    stored: str
-    column: int | None
-
-
 #: Attributes that have a text for each column.
 _LISTS = ("columns", "measures")
 
@@ -68,8 +57,9 @@ class Results(SignalMapping, WithSensitivities, WithLinear):
     """What a run recorded; `results["bodies/2/position"]` is an array over output times.
 
     A name may end in ``/x``, ``/y``, ``/z`` or ``/mag`` (a quaternion also in ``/w``, a request
-    in ``/F1`` to ``/F8``). Scalars come as numbers. Use it as a context manager or call
-    `close` to let go of the file, which is h5py's or, in memory, a `MemoryFile`.
+    in ``/F1`` to ``/F8``), and begin with ``sensitivity/<parameter>/``. Scalars come as numbers.
+    Use it as a context manager or call `close` to let go of the file, which is h5py's or, in
+    memory, a `MemoryFile`.
     """
 
     def __init__(self, file: h5py.File, path: Path | None) -> None:
@@ -79,10 +69,7 @@ class Results(SignalMapping, WithSensitivities, WithLinear):
     def _read_from(self, file: h5py.File) -> None:
         """Look at this file from here on."""
         self._file = file
-        # once they were looked up
-        self._signals: dict[str, int] | None = None
-        self._ids: dict[str, list[int]] | None = None
-        self._table: dict[str, Location] | None = None
+        self._looked_up = SignalIndex(file)
 
     def _itself(self) -> Results:
         return self
@@ -139,6 +126,11 @@ class Results(SignalMapping, WithSensitivities, WithLinear):
         return self._file
 
     @property
+    def _index(self) -> SignalIndex:
+        self._open()
+        return self._looked_up
+
+    @property
     @reads
     def attributes(self) -> dict[str, Any]:
         """Attributes of the file: version, model, units, settings, status."""
@@ -184,66 +176,12 @@ class Results(SignalMapping, WithSensitivities, WithLinear):
 
         Without the checkpoint, and without what only pictures need.
         """
-        return sorted((*self._stored(), *self._columnwise()), key=order)
-
-    def _stored(self) -> dict[str, h5py.Dataset]:
-        """Return the datasets that hold one signal or table, by name."""
-        found: dict[str, h5py.Dataset] = {}
-        file = self._open()
-
-        def note(name: str, item: Any) -> None:
-            group, _, last = name.rpartition("/")
-            if not is_dataset(item) or name.startswith(NO_KEYS):
-                return
-            # of a group whose elements stand side by side `_columnwise` gives the names
-            if "/" in group or not last or f"{group}/id" not in file:
-                found[name] = item
-
-        file.visititems(note)
-        return found
-
-    def _columnwise(self) -> dict[str, Location]:
-        """Return the signals whose elements stand side by side, by names with ids."""
-        if self._table is None:
-            self._table = {}
-            for group, ids in self._columns().items():
-                for last, item in self._open()[group].items():
-                    if last in FACTS or not hasattr(item, "shape"):
-                        continue
-                    for k, id in enumerate(ids):
-                        self._table[f"{group}/{id}/{last}"] = Location(f"{group}/{last}", k)
-        return self._table
-
-    def _columns(self) -> dict[str, list[int]]:
-        """Return the ids in order of their columns, by group."""
-        if self._ids is None:
-            self._ids = {
-                group: values_of(item["id"]).tolist()
-                for group, item in self._open().items()
-                if group not in NO_ELEMENTS and hasattr(item, "keys") and "id" in item
-            }
-        return self._ids
+        return self._index.keys()
 
     @reads
     def signals(self) -> dict[str, int]:
         """Return what has a value at every output time: names, sorted -> numbers of columns."""
-        if self._signals is not None:
-            return self._signals
-        file, found = self._open(), {}
-        rows = len(file["time"]) if "time" in file else 0
-        for name, item in self._stored().items():
-            # /state is the solver's own, in its own layout; points are not one a row
-            if not name.startswith(NO_SIGNALS) and is_signal(item, item.shape, rows):
-                found[name] = 1 if item.ndim == 1 else item.shape[1]
-        shapes = {
-            stored: file[stored] for stored in {s.stored for s in self._columnwise().values()}
-        }
-        for name, location in self._columnwise().items():
-            item = shapes[location.stored]
-            if item.ndim > 1 and is_signal(item, (item.shape[0], *item.shape[2:]), rows):
-                found[name] = 1 if item.ndim == 2 else item.shape[2]
-        self._signals = {name: found[name] for name in sorted(found, key=order)}
-        return self._signals
+        return self._index.signals()
 
     @property
     def errors(self) -> Errors:
@@ -293,7 +231,7 @@ class Results(SignalMapping, WithSensitivities, WithLinear):
         """
         file = self._open()
         group, _, id = name.strip("/").partition("/")
-        ids = self._columns().get(group)
+        ids = self._index.columns().get(group)
         if ids is not None and id.isdecimal() and int(id) in ids:
             if attribute not in FACTS or attribute not in file[group]:
                 return None
@@ -327,7 +265,7 @@ class Results(SignalMapping, WithSensitivities, WithLinear):
     @reads
     def ids(self, group: str) -> list[int]:
         """Ids of ``bodies``, ``contacts``, ``joints`` or ``requests``, ascending."""
-        there = self._columns().get(group, ())
+        there = self._index.columns().get(group, ())
         stored = (int(id) for id in self._open().get(group, ()) if id.isdecimal())
         return sorted({*there, *stored})
 
@@ -357,40 +295,16 @@ class Results(SignalMapping, WithSensitivities, WithLinear):
         if part not in (None, "mag"):
             index[-1] = PARTS[dataset.shape[-1]][part]
         values = plain(values_of(dataset, tuple(index)))
-        return np.linalg.norm(values, axis=1) if part == "mag" else values
+        if part != "mag":
+            return values
+        if location.stored.startswith(SENSITIVITY):
+            return self._slope_of_size(location, values)
+        return np.linalg.norm(values, axis=1)
 
     @reads
     def _find(self, name: str) -> tuple[Location, str | None] | None:
         """Return where a name is stored and the part of it asked for."""
-        whole = name.strip("/")
-        if not whole:
-            return None
-        location = self._location(whole)
-        if location is not None:
-            return location, None
-        whole, _, part = whole.rpartition("/")
-        location = self._location(whole) if whole else None
-        if location is None:
-            return None
-        dataset = self._open()[location.stored]
-        columns = dataset.ndim - (location.column is not None)
-        if columns != 2:
-            return None
-        return (location, part) if part in parts_of(dataset.shape[-1]) else None
-
-    def _location(self, name: str) -> Location | None:
-        """Return where a signal or table is stored."""
-        file = self._open()
-        if is_dataset(file.get(name)):
-            return Location(name, None)
-        group, _, rest = name.partition("/")
-        id, _, last = rest.partition("/")
-        ids = self._columns().get(group)
-        if ids is None or last in FACTS or not id.isdecimal() or int(id) not in ids:
-            return None
-        if not is_dataset(file.get(f"{group}/{last}")):
-            return None
-        return Location(f"{group}/{last}", ids.index(int(id)))
+        return self._index.find(name)
 
     @reads
     def located(self, name: str) -> tuple[h5py.File, Location | None, str | None]:
@@ -400,7 +314,7 @@ class Results(SignalMapping, WithSensitivities, WithLinear):
     @reads
     def last(self, group: str, signal: str) -> dict[int, Any]:
         """Return the last row of a signal of all elements of a group, by id."""
-        ids = self._columns().get(group)
+        ids = self._index.columns().get(group)
         if ids is None:
             names = {id: f"{group}/{id}/{signal}" for id in self.ids(group)}
             return {id: last_row(self[name]) for id, name in names.items() if name in self}

@@ -8,8 +8,9 @@ import numpy as np
 
 from mbsim.errors import UnknownSignal
 from mbsim.results.damage import reads
-from mbsim.results.form import facts_of, plain, values_of
-from mbsim.results.names import PARTS
+from mbsim.results.form import facts_of
+from mbsim.results.names import SENSITIVITY, of_slope
+from mbsim.results.signal_index import Location
 
 if TYPE_CHECKING:
     from mbsim.results.reading import Results
@@ -22,13 +23,12 @@ class WithSensitivities:
     @reads
     def parameters(self: Results) -> dict[str, dict[str, Any]]:  # type: ignore[misc]
         """Parameters by which there are derivatives: value, until when they are known, and why."""
-        file, *_ = self.located("time")
-        group = file.get("sensitivity")
-        return {} if group is None else {name: facts_of(item) for name, item in group.items()}
+        return {name: facts_of(item) for name, item in self._index.parameters().items()}
 
-    @reads
     def sensitivity(self: Results, name: str, parameter: str) -> Any:  # type: ignore[misc]
         """Return the derivative of a signal with respect to a parameter of the deck.
+
+        It is `results[f"sensitivity/{parameter}/{name}"]` too.
 
         Parameters
         ----------
@@ -47,25 +47,22 @@ class WithSensitivities:
         UnknownSignal
             If the run has no such derivative.
         """
-        file, location, part = self.located(name)
         known = self.parameters
         if parameter not in known:
             there = f"; there are {', '.join(known)}" if known else ""
             raise UnknownSignal(
                 f"no sensitivity to {parameter}{there}: run it with --sensitivity {parameter}"
             )
-        if location is None:
+        if name not in self:
             raise UnknownSignal(f"{name}: no such signal")
-        stored = file.get(f"sensitivity/{parameter}/{location.stored}")
-        if stored is None:
+        found = f"{SENSITIVITY}{parameter}/{name.strip('/')}"
+        if found not in self:
             raise UnknownSignal(f"{name} has no sensitivity: it is no signal of the motion")
-        slope, value = values_of(stored), values_of(file[location.stored])
-        if location.column is not None:
-            slope, value = slope[:, location.column], value[:, location.column]
-        if part is None:
-            return plain(slope)
-        if part == "mag":
-            size = np.linalg.norm(value, axis=-1)
-            with np.errstate(invalid="ignore", divide="ignore"):
-                return plain(np.einsum("ij,ij->i", value, slope) / size)
-        return plain(slope[:, PARTS[slope.shape[1]][part]])
+        return self[found]
+
+    def _slope_of_size(self: Results, location: Location, slope: Any) -> Any:  # type: ignore[misc]
+        """Return the derivative of a vector's length, (n,), by that of the vector, (n, 3)."""
+        _, signal = of_slope(location.stored)
+        value = self._values(Location(signal, location.column), None)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.einsum("ij,ij->i", value, slope) / np.linalg.norm(value, axis=1)

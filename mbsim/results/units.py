@@ -9,18 +9,24 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from mbsim.errors import ModelError
 from mbsim.reader import units as u
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """What is measured, and the powers of force, length, time and radian in its unit."""
+    """What is measured, and the powers of force, length, time, radian and mass in its unit.
+
+    `per` is what else it is divided by: a number whose unit is not known.
+    """
 
     name: str
     force: int = 0
     length: int = 0
     time: int = 0
     angle: int = 0
+    mass: int = 0
+    per: str = ""
 
 
 TIME = Quantity("Time", time=1)
@@ -36,17 +42,18 @@ TORQUE = Quantity("Torque", force=1, length=1)
 
 @dataclass(frozen=True)
 class UnitSystem:
-    """The model's units of force, length and time, by MotionSolve's names."""
+    """The model's units of force, length, time and mass, by MotionSolve's names."""
 
     force: str = "NEWTON"
     length: str = "METER"
     time: str = "SECOND"
+    mass: str = "KILOGRAM"
 
     @classmethod
     def of(cls, attributes: Mapping[str, Any]) -> UnitSystem:
         """Return the units of a result file: `units` holds force, mass, length, time."""
         words = str(attributes.get("units", "")).split()
-        return cls(words[0], words[2], words[3]) if len(words) == 4 else cls()
+        return cls(words[0], words[2], words[3], words[1]) if len(words) == 4 else cls()
 
     @property
     def summary(self) -> str:
@@ -64,17 +71,32 @@ class UnitSystem:
             ("rad", quantity.angle),
             (length, quantity.length),
             (time, quantity.time),
+            (u.symbol(self.mass), quantity.mass),
         ]
         over = "·".join(_power(unit, power) for unit, power in powers if power > 0)
-        under = "·".join(_power(unit, -power) for unit, power in powers if power < 0)
+        below = [_power(unit, -power) for unit, power in powers if power < 0]
+        below += [quantity.per] if quantity.per else []
+        under = "·".join(below) if len(below) < 2 else f"({'·'.join(below)})"
         return f"{over or '1'}/{under}" if under else over
 
     def factor_to(self, other: UnitSystem, quantity: Quantity) -> float:
-        """Return what a value in these units is multiplied with to be one in the others."""
+        """Return what a value in these units is multiplied with to be one in the others.
+
+        Raises
+        ------
+        ModelError
+            If the quantity is divided by a number whose unit is not known.
+        """
+        if quantity.per and self != other:
+            raise ModelError(
+                f"{quantity.name}: the unit of {quantity.per} is not known, so it cannot be shown "
+                f"in {other.summary}; give runs in the same units"
+            )
         factor = (
             (u.FORCE[self.force] / u.FORCE[other.force]) ** quantity.force
             * (u.LENGTH[self.length] / u.LENGTH[other.length]) ** quantity.length
             * (u.TIME[self.time] / u.TIME[other.time]) ** quantity.time
+            * (u.MASS[self.mass] / u.MASS[other.mass]) ** quantity.mass
         )
         return float(Fraction(factor))
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mbsim.results.names import parts_of
+from mbsim.results.names import SENSITIVITY, parts_of
 from mbsim.results.quantities import quantity_of
 from mbsim.results.units import UnitSystem
 from mbsim.view.scene import Scene
@@ -69,7 +69,10 @@ def _ordered(scene: Scene, asked: Sequence[str]) -> list[str]:
     signals = [
         name
         for name in scene.results.signals()
-        if name != "time" and not (name.startswith("bodies/") and name.endswith(_FROM_POSES))
+        if name != "time"
+        # of a derivative the page could not find that of a magnitude
+        and not name.startswith(SENSITIVITY)
+        and not (name.startswith("bodies/") and name.endswith(_FROM_POSES))
     ]
 
     def rank(name: str) -> int:

@@ -323,7 +323,11 @@ def test_they_are_kept_in_the_file(tmp_path):
         size = results.sensitivity("bodies/2/position/mag", name)
         assert size == pytest.approx(found[:, 0] * np.sign(results["bodies/2/position/x"]))
         assert name in results.parameters
-        assert not any(signal.startswith("sensitivity") for signal in results.signals())
+        whole = f"sensitivity/{name}/bodies/2/position"
+        assert results.signals()[whole] == 3
+        assert results.find(f"sensitivity/{name}/bodies/*/position/x") == [f"{whole}/x"]
+        assert (results[whole] == found).all()
+        assert (results[f"{whole}/mag"] == size).all()
         with pytest.raises(UnknownSignal, match="--sensitivity"):
             results.sensitivity("bodies/2/position", "Body_Rigid[2].inertia_xx")
         with pytest.raises(UnknownSignal, match="no such signal"):
