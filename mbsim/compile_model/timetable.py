@@ -336,6 +336,9 @@ def follows_time(scene: Scene) -> bool:
 
 def _asks_time(system: System) -> bool:
     """Return whether a user's function may look at the time."""
+    from importlib.util import decode_source
+
+    from mbsim.core.stored import read_regular
     from mbsim.plugins.source.diagnose import reads_parameter
 
     if any(name[0] != STATEMENT and user.acts for name, user in system.subroutines.items()):
@@ -344,6 +347,6 @@ def _asks_time(system: System) -> bool:
         source = user.source
         if user.function is None or source.suffix != ".py":
             return True
-        if reads_parameter(source.read_text(encoding="utf-8"), user.name, 1):
+        if reads_parameter(decode_source(read_regular(source)), user.name, 1):
             return True
     return False

@@ -122,8 +122,9 @@ def _load_subroutines(
     return load(model, plugins, scripts)
 
 
+@functools.cache
 def no_residuals() -> Residuals:
-    """Return the rows of a model without elements of users' residuals."""
+    """Return the rows of a model without elements of users' residuals: there is nothing in them."""
     return Residuals(*(np.zeros((0,) * axes, kind) for kind, axes in _residual_arrays()))
 
 

@@ -166,6 +166,19 @@ def awaited(py_func: Callable[..., Any], allocates: bool = True) -> Callable[...
 
 
 _kept: dict[Any, Any] = {}
+#: Addresses by function and id of the signature, which is kept so that the id stays its own: most
+#: are written down once, and their hashes take long.
+_known: dict[tuple[Any, int], tuple[int, Any]] = {}
+_KNOWN_MOST = 1 << 12
+
+
+def _note(key: tuple[Any, Any], address: int) -> int:
+    """Return an address, having noted it."""
+    if len(_known) >= _KNOWN_MOST:
+        _known.clear()
+    py_func, signature = key
+    _known[py_func, id(signature)] = address, signature
+    return address
 
 
 def address(py_func: Callable[..., Any], signature: Any, allocates: bool = False) -> int:
@@ -175,9 +188,11 @@ def address(py_func: Callable[..., Any], signature: Any, allocates: bool = False
     arrays, as users' functions may.
     """
     global compile_seconds
+    if (known := _known.get((py_func, id(signature)))) is not None:
+        return known[0]
     key = py_func, signature
     if key in _kept:
-        return int(_kept[key].address)
+        return _note(key, int(_kept[key].address))
     linking.install_library()
     typed = sigutils.normalize_signature(signature)
     made: Any = CFunc(py_func, typed, {}, {"error_model": "numpy", "_nrt": allocates})
@@ -195,7 +210,7 @@ def address(py_func: Callable[..., Any], signature: Any, allocates: bool = False
         # what Numba and the linker do between the passes is compiling as well
         compile_seconds = counted + time.perf_counter() - began
     _kept[key] = made
-    return int(made.address)
+    return _note(key, int(made.address))
 
 
 #: Stands for the address of what is only counted; 0 would say that nothing is wanted.

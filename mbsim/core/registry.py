@@ -39,11 +39,13 @@ class Registry(Generic[Entry]):
                 importlib.import_module(f"{self._package}.{module.name}")
 
     def __getitem__(self, name: str) -> Entry:
-        self._load()
+        if not self._loaded:
+            self._load()
         return self._entries[name]
 
     def __contains__(self, name: str) -> bool:
-        self._load()
+        if not self._loaded:
+            self._load()
         return name in self._entries
 
     def __iter__(self) -> Iterator[str]:

@@ -32,6 +32,10 @@ _FEW_BYTES = 2**16
 _SECONDS, _SECONDS_A_BYTE = 3.0, 2e-7
 
 
+#: Files of fewer bytes are read in one.
+_AT_ONCE = 1 << 20
+
+
 def claims_too_much(dataset: h5py.Dataset) -> bool:
     """Return whether a dataset would be larger in memory than what is stored of it can make.
 
@@ -53,11 +57,21 @@ def read_regular(path: Path, most: int = -1) -> bytes:
     """
     # opening a FIFO waits for whoever writes into it
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
-    with os.fdopen(handle, "rb") as file:
-        mode = os.fstat(handle).st_mode
-        if not stat.S_ISREG(mode):
-            raise OSError(0, "is a folder" if stat.S_ISDIR(mode) else "is no regular file")
-        return file.read(most)
+    try:
+        about = os.fstat(handle)
+        if not stat.S_ISREG(about.st_mode):
+            is_folder = stat.S_ISDIR(about.st_mode)
+            raise OSError(0, "is a folder" if is_folder else "is no regular file")
+        if 0 < about.st_size < _AT_ONCE and not 0 <= most <= about.st_size:
+            # one byte more than there is: who gets it all in one does not ask again
+            found = os.read(handle, about.st_size + 1)
+            if len(found) == about.st_size:
+                return found
+            os.lseek(handle, 0, os.SEEK_SET)
+        with os.fdopen(handle, "rb", closefd=False) as file:
+            return file.read(most)
+    finally:
+        os.close(handle)
 
 
 def apart(do: Callable[[], Made], *paths: Path) -> Made:

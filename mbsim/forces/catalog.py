@@ -43,6 +43,7 @@ an equation, in `dynamics.stiction.rigid_friction`.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar, NamedTuple, Protocol
@@ -283,15 +284,23 @@ FORCES: Registry[ForceKind] = Registry(
 )
 
 
-def of_form(*forms: type[Form]) -> list[ForceKind]:
+@functools.cache
+def table_of(name: str) -> str:
+    """Return the field of `Model` that has elements of a kind, nothing where several share one."""
+    return FORCES[name].table if name in FORCES else name
+
+
+@functools.cache
+def of_form(*forms: type[Form]) -> tuple[ForceKind, ...]:
     """Return the kinds of these forms."""
-    return [kind for name in FORCES if isinstance((kind := FORCES[name]).form, forms)]
+    return tuple(kind for name in FORCES if isinstance((kind := FORCES[name]).form, forms))
 
 
-def memories() -> list[ForceKind]:
+@functools.cache
+def memories() -> tuple[ForceKind, ...]:
     """Return the kinds that remember something from step to step."""
     kinds = [FORCES[name] for name in FORCES]
-    return [kind for kind in kinds if isinstance(kind.form, Switched) and kind.form.commit]
+    return tuple(kind for kind in kinds if isinstance(kind.form, Switched) and kind.form.commit)
 
 
 def _nothing_wrong(values: Values) -> Iterable[Finding]:

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mbsim.expressions import Expression
-from mbsim.forces.catalog import FORCES
+from mbsim.forces.catalog import FORCES, table_of
 from mbsim.model.curves import HigherPairs
 from mbsim.model.forces import (
     BodyForce,
@@ -479,7 +479,7 @@ class Model(HigherPairs):
 
     def table(self, name: str) -> Mapping[int, Any]:
         """Return the elements of a field by id, or those of a kind of `forces.catalog`."""
-        field = FORCES[name].table if name in FORCES else name
+        field = table_of(name)
         if not field:
             return self.marker_forces.get(name, {})
         found: dict[int, Any] = getattr(self, field)

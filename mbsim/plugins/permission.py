@@ -11,7 +11,7 @@ from functools import wraps
 from pathlib import Path
 from typing import Any
 
-from mbsim.core.machine import free_memory
+from mbsim.core.machine import first_bytes, free_memory
 from mbsim.errors import ModelError
 from mbsim.model.elements import Subroutine
 
@@ -170,7 +170,7 @@ def _bounded_memory() -> Iterator[None]:
     try:
         import resource
 
-        used = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[5])
+        used = int(first_bytes("/proc/self/statm").split()[5])
         soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
         free = free_memory()
     except (ImportError, OSError, ValueError, IndexError, AttributeError):

@@ -7,6 +7,7 @@ by a second scan of the text, which is known to be well formed by then.
 
 from __future__ import annotations
 
+import functools
 import re
 import unicodedata
 from bisect import bisect_right
@@ -72,6 +73,18 @@ class Node:
     comments: tuple[str, ...] = ()
     last_comments: tuple[str, ...] = ()
 
+    def copy(self) -> Node:
+        """Return one whose attributes may be changed, and those of its children."""
+        return Node(
+            self.tag,
+            self.line,
+            [Attribute(a.name, a.value, a.line, a.origin) for a in self.attributes],
+            self.text,
+            [child.copy() for child in self.children],
+            self.comments,
+            self.last_comments,
+        )
+
     @property
     def key(self) -> str:
         """Return the tag in the form in which tags are compared."""
@@ -134,6 +147,30 @@ def parse(data: bytes, file: str, note: Callable[[int, str], None] = _ignore) ->
     if root.getroottree().docinfo.internalDTD is not None:
         raise _refused(file, 1, "a DOCTYPE is not accepted: decks have no DTD and no entities")
     return _to_nodes(root, text, file)
+
+
+#: Bytes of a deck whose tree is kept, and how many are.
+_KEPT_BYTES, _KEPT_TREES = 1 << 20, 4
+
+
+def parsed(data: bytes, file: str, note: Callable[[int, str], None]) -> Node:
+    """Return what `parse` does, kept where it is small: nobody changes the tree.
+
+    A process that runs a deck many times, with other values, has the bytes again.
+    """
+    if len(data) > _KEPT_BYTES:
+        return parse(data, file, note)
+    root, notes = _parsed(data, file)
+    for line, message in notes:
+        note(line, message)
+    return root
+
+
+@functools.lru_cache(maxsize=_KEPT_TREES)
+def _parsed(data: bytes, file: str) -> tuple[Node, list[tuple[int, str]]]:
+    """Return the root of a deck, and lines and texts of notes."""
+    notes: list[tuple[int, str]] = []
+    return parse(data, file, lambda line, message: notes.append((line, message))), notes
 
 
 def _refused(file: str, line: int, message: str) -> DeckError:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import cache
@@ -20,12 +21,18 @@ if TYPE_CHECKING:
 _PLAIN = frozenset((int, float, bool, str, type(None), Source))
 
 
+#: And the words of annotations that say so.
+_PLAIN_WORDS = frozenset(("int", "float", "bool", "str", "None", "Source", "tuple", "Array"))
+
+
 @cache
 def _fields(kind: type) -> tuple[str, ...]:
-    """Return the fields that a dataclass is made of, none of what is no dataclass."""
+    """Return the fields that a dataclass is made of, none of what can hold no expression."""
     if not dataclasses.is_dataclass(kind):
         return ()
-    return tuple(each.name for each in dataclasses.fields(kind) if each.init)
+    made_of = [each for each in dataclasses.fields(kind) if each.init]
+    words = {word for each in made_of for word in re.findall(r"\w+", str(each.type))}
+    return () if words <= _PLAIN_WORDS else tuple(each.name for each in made_of)
 
 
 class Rewriting(ABC):
@@ -46,10 +53,9 @@ class Rewriting(ABC):
 
     def rewrite(self) -> None:
         """Rewrite the elements and simulations of the draft."""
-        for table in dataclasses.fields(self.draft):
-            old = getattr(self.draft, table.name)
-            if isinstance(old, dict):
-                setattr(self.draft, table.name, self(old))
+        for name, old in vars(self.draft).items():
+            if isinstance(old, dict) and old:
+                setattr(self.draft, name, self(old))
         self.draft.simulations = self(self.draft.simulations)
 
     def __call__(self, value: Any) -> Any:

@@ -27,7 +27,7 @@ from mbsim.reader.linear_analysis import check_plants
 from mbsim.reader.linear_systems import expand
 from mbsim.reader.multi_point import expand as expand_multi_points
 from mbsim.reader.overrides import apply_overrides, as_texts
-from mbsim.reader.parse import MAX_BYTES, Node, parse
+from mbsim.reader.parse import MAX_BYTES, Node, parse, parsed
 from mbsim.reader.points import hold_points
 from mbsim.reader.statements import read_section
 
@@ -109,8 +109,10 @@ def _read(path: Given, texts: tuple[str, ...]) -> el.Model:
     draft.faults.extend(map(said_so, complete_curves(draft)))
     draft.faults.extend(map(said_so, check_plants(draft)))
     complete_motions(draft)
-    draft.faults.extend(map(said_so, hold_clusters(draft, _to_model(draft, deck, ""))))
-    draft.faults.extend(map(said_so, complete_gears(draft, _to_model(draft, deck, ""))))
+    if draft.clusters or draft.planar:
+        draft.faults.extend(map(said_so, hold_clusters(draft, _to_model(draft, deck, ""))))
+    if draft.gears:
+        draft.faults.extend(map(said_so, complete_gears(draft, _to_model(draft, deck, ""))))
     model = _to_model(draft, deck, hashlib.sha256(data + draft.more).hexdigest())
     known = Known(frozenset(draft.broken), draft.display_graphics)
     faults, warnings = check_model(model, known)
@@ -120,8 +122,7 @@ def _read(path: Given, texts: tuple[str, ...]) -> el.Model:
             faults = [*faults, *(fault for fault in later if fault not in faults)]
     if draft.faults or faults:
         raise DeckError([*draft.faults, *map(said_so, faults)])
-    draft.warnings.extend(warnings)
-    return replace(_to_model(draft, deck, model.sha256), overrides=texts)
+    return replace(model, warnings=(*draft.warnings, *warnings), overrides=texts)
 
 
 def _read_draft(
@@ -187,9 +188,11 @@ def _as_it_is(fault: Fault) -> Fault:
 
 def _fill(data: bytes, draft: Draft, overrides: Sequence[str]) -> None:
     """Read the XML deck `data` into the draft; faults go there too."""
-    root = parse(data, draft.file, draft.note)
+    root = parsed(data, draft.file, draft.note)
     sections = list(_find_sections(root, draft))
-    apply_overrides(sections, overrides)
+    if overrides:
+        sections = [section.copy() for section in sections]
+        apply_overrides(sections, overrides)
 
     # the model first, wherever it stands: commands refer to it
     for section in sorted(sections, key=lambda section: section.key != "model"):

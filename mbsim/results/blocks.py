@@ -80,21 +80,24 @@ class Gathered:
         #: Tables whose rows are written, to be filled anew.
         self._spare = dict(self._tables)
         self._ends = dict.fromkeys(self._tables, 0)
+        #: How many rows there will be at least, as far as is known.
+        self.expected = 0
 
     def take(self, rows: int, incidents: int, events: int) -> Block:
         """Add the first rows that the pipeline has left, and return what was added."""
         points = incidents if len(self._system.scene.rows.points) else 0
         counts = {"incidents": incidents, "points": points, "events": events}
-        added = []
+        added, left = [], self._system.scene.rows
         for name, first in self._ends.items():
-            end = first + counts.get(name, rows)
-            if end > first:
-                self._make_room(name, end)
-                self._ends[name] = end
-            table = self._tables[name]
-            if end > first and self._widths[name]:
-                table[first:end] = getattr(self._system.scene.rows, name)[: end - first]
-            added.append(table[first:end])
+            count, table = counts.get(name, rows), self._tables[name]
+            if count:
+                if first + count > len(table):
+                    self._make_room(name, first + count)
+                    table = self._tables[name]
+                self._ends[name] = first + count
+                if self._widths[name]:
+                    table[first : first + count] = getattr(left, name)[:count]
+            added.append(table[first : first + count])
         return Block(*added)
 
     def _make_room(self, name: str, rows: int) -> None:
@@ -105,7 +108,10 @@ class Gathered:
         if rows <= len(self._spare[name]):
             made, self._spare[name] = self._spare[name], _without_rows(table)
         else:
-            # a long run's are made once; columns a power of two apart meet in a cache
+            # a long run's are made once, a short one's with room for what it is expected to have;
+            # columns a power of two apart meet in a cache
+            if name not in _NOT_A_ROW:
+                rows = max(rows, min(self.expected, self._usual))
             most = self._usual + self._usual // 8 if 8 * rows > self._usual else 0
             room = max(rows, most, 2 * len(table)) + 24
             order = self._order if name not in _NOT_A_ROW else "C"
@@ -141,7 +147,8 @@ class Gathered:
         for name, end in list(self._ends.items()):
             first = len(getattr(block, name))
             self._ends[name] = 0
-            self._make_room(name, end - first)
+            if end > first:
+                self._make_room(name, end - first)
             self._tables[name][: end - first] = gone[name][first:end]
             self._ends[name] = end - first
         return gone

@@ -7,7 +7,8 @@ of its cg marker, of ground the global frame.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -56,6 +57,22 @@ def graphics_of(model: Model, placement: Placement) -> dict[str, Table]:
     rows = list(_shapes(model, placement, meshes))
     found["graphics/shapes"] = _with_labels(SHAPE, rows, model.graphics)
     return found | meshes.tables()
+
+
+def graphics_later(model: Model, placement: Placement) -> dict[str, Callable[[], Table]]:
+    """Return what makes the tables by name, all of them where one is asked for.
+
+    Of results in memory hardly anybody looks at them.
+    """
+    made = cache(lambda: graphics_of(model, placement))
+    names = ["markers", "connections", "graphics/shapes"]
+    if any(_is_mesh(graphic) for graphic in model.graphics.values()):
+        names += ["graphics/meshes", "graphics/vertices", "graphics/faces"]
+    return {name: partial(_one_of, made, name) for name in names}
+
+
+def _one_of(made: Callable[[], dict[str, Table]], name: str) -> Table:
+    return made()[name]
 
 
 def about_graphics(model: Model, placement: Placement) -> dict[str, float]:
@@ -128,6 +145,10 @@ def _connections(model: Model) -> Iterator[tuple[Any, ...]]:
     for contact in model.contacts.values():
         one = (b.pop() if len(b) == 1 else NONE for b in contact_bodies(model, contact))
         yield b"contacts", contact.id, NONE, NONE, *one
+
+
+def _is_mesh(graphic: Graphic) -> bool:
+    return graphic.vertices is not None and graphic.faces is not None
 
 
 class _Meshes:

@@ -132,6 +132,29 @@ class RunLog:
         self.flush()
 
 
+class NoLog(RunLog):
+    """The log of a run without a folder, which nobody reads."""
+
+    def __init__(self) -> None:
+        self.closed = False
+
+    def line(self, text: str) -> None:
+        """Keep nothing."""
+
+    def show(self) -> None:
+        """Write nothing."""
+
+    def close(
+        self,
+        status: str,
+        stats: Mapping[str, Value],
+        watch: Watch | None = None,
+        audit: Audit | None = None,
+    ) -> None:
+        """Write nothing."""
+        self.closed = True
+
+
 def counts(model: Model) -> dict[str, int]:
     """Return the numbers of elements by name, for logs and `mbsim check`."""
     between_markers = {

@@ -18,13 +18,21 @@ Table = np.ndarray[Any, Any]
 
 
 class MemoryDataset:
-    """One dataset: an array with attributes. What is read is a copy, as of a file."""
+    """One dataset: an array with attributes. What is read is a copy, as of a file.
+
+    Values may be given as a function that makes them: it is called where they are looked at.
+    """
 
     def __init__(self, parent: MemoryGroup, name: str, values: Any) -> None:
         self.parent = parent
         self.name = name
         self.attrs: dict[str, Any] = {}
-        self._parts = [np.array(values)]
+        self._make: Callable[[], Table] | None = values if callable(values) else None
+        self._parts = [] if callable(values) else [np.array(values)]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Let a copy in another process have the values."""
+        return {**vars(self), "_parts": [self.values], "_make": None}
 
     def append(self, rows: Table) -> None:
         """Add rows; what is given is another's, who fills it anew."""
@@ -33,6 +41,8 @@ class MemoryDataset:
     @property
     def values(self) -> Table:
         """All rows."""
+        if self._make is not None:
+            self._parts, self._make = [self._make()], None
         if len(self._parts) > 1:
             self._parts = [np.concatenate(self._parts)]
         return self._parts[0]
@@ -50,12 +60,13 @@ class MemoryDataset:
     @property
     def ndim(self) -> int:
         """Number of axes."""
-        return self._parts[0].ndim
+        return self.values.ndim
 
     @property
     def dtype(self) -> np.dtype[Any]:
         """Type of a value."""
-        return self._parts[0].dtype
+        found: np.dtype[Any] = self.values.dtype
+        return found
 
     def __len__(self) -> int:
         return len(self.values)
@@ -148,7 +159,8 @@ class MemoryGroup:
     def create_dataset(self, path: str, data: Any) -> MemoryDataset:
         """Return a new dataset, in the place of one that is there."""
         group, _, last = path.strip("/").rpartition("/")
-        holder = self.create_group(group) if group else self
+        there = self._members.get(group) if group else self
+        holder = there if isinstance(there, MemoryGroup) else self.create_group(group)
         made = MemoryDataset(holder, f"{holder.name.rstrip('/')}/{last}", data)
         holder._members[last] = made
         return made
@@ -204,7 +216,7 @@ class MemoryStore:
         self,
         rows: Mapping[str, Table] | None = None,
         values: Mapping[str, Any] | None = None,
-        constants: Mapping[str, Table] | None = None,
+        constants: Mapping[str, Callable[[], Table]] | None = None,
         attributes: Mapping[str, Mapping[str, Any]] | None = None,
         remove: Iterable[str] = (),
         last: bool = False,
@@ -222,9 +234,8 @@ class MemoryStore:
                     file.create_dataset(name, table)
                 else:
                     before.append(table)
-            for given in (values, constants):
-                for name, table in (given or {}).items():
-                    file.create_dataset(name, table)
+            for name, given in {**(values or {}), **(constants or {})}.items():
+                file.create_dataset(name, given)
             for name, facts in (attributes or {}).items():
                 item = file if name == "/" else file.get(name)
                 if item is None:

@@ -14,8 +14,8 @@ import numpy as np
 
 from mbsim.arrays.codes import PEAK_DEPTH, PEAK_FORCE, PEAK_SLIP
 from mbsim.core import profile
-from mbsim.core.machine import free_memory
-from mbsim.errors import ModelError, ResultsError
+from mbsim.errors import ResultsError
+from mbsim.results import room
 from mbsim.results.audit import Audit, to_attributes
 from mbsim.results.background import Background
 from mbsim.results.blocks import (
@@ -52,8 +52,6 @@ _PEAKS = {"force": PEAK_FORCE, "penetration": PEAK_DEPTH, "slip_speed": PEAK_SLI
 BUFFER_BYTES = 32 << 20
 #: At least so many output rows are written at once: chunks of fewer are read slowly.
 FEWEST_ROWS = 16
-#: Memory that an output time takes while its rows are not there yet [bytes].
-TIME_BYTES = 32
 #: Time between two publications: at least this [s], and so many times what one takes.
 FLUSH_SECONDS = 5.0
 FLUSH_SHARE = 50.0
@@ -133,7 +131,8 @@ class Recorder:
         check_requests(system.model)
         if asked:
             self._asked.check(names_of(system))
-        digests = {} if self._bare else self._identity.digests
+        # what a run goes on from, or is built again from, is a file
+        digests = {} if directory is None else self._identity.digests
         self._settings: dict[str, Value] = {**attributes, **digests}
         if directory is not None:
             prepare_directory(directory, system.model.name)
@@ -175,22 +174,16 @@ class Recorder:
         """
         self._store.rows = int(min(rows, 1e9)) + 1
         rows = max(0.0, rows - self._written[0])  # those of a run that goes on are there
+        self._gathered.expected = int(min(rows, self._block))
+        requests = len(self.system.model.requests)
+        at_most = 4 * row_bytes(self.system) + room.REQUEST_BYTES * requests + room.TIME_BYTES
+        disk = None if self._target is None else (self.directory, self._store.room())
+        room.check(rows, at_most, self._signal_bytes, disk)
+
+    def _signal_bytes(self) -> int:
+        """Return how large a row of all signals is."""
         tables = (table for _, table in self._signals(nothing(self.system)))
-        size = sum(table.itemsize * math.prod(table.shape[1:]) for table in tables)
-        memory = free_memory()
-        if self._target is None:
-            place, free = "in memory", memory
-        else:
-            place, free = f"in {self.directory}", self._store.room()
-        if memory is not None and rows * TIME_BYTES > memory:
-            # the times themselves are kept in memory
-            size, place, free = TIME_BYTES, "in memory", memory
-        if free is not None and rows * size > free:
-            raise ModelError(
-                f"{rows:.9g} output rows of {size} bytes would take {rows * size / 1e9:.3g} GB "
-                f"{place}, where {free / 1e9:.3g} GB are free; give a longer --print-interval, an "
-                "earlier --end-time, or --signals"
-            )
+        return sum(table.itemsize * math.prod(table.shape[1:]) for table in tables)
 
     def take(self) -> None:
         """Take all rows, incidents and events that the pipeline has left so far."""
@@ -327,7 +320,12 @@ class Recorder:
         return self._watch
 
     def _look(self, block: Block, first: int) -> None:
-        """Look at rows from a first one on: many at once, for each look costs."""
+        """Look at rows from a first one on: many at once, for each look costs.
+
+        Only a log says what was seen, and there is none in memory.
+        """
+        if self._target is None:
+            return
         self._watch.add(block.time[first:], block.energy[first:], block.wrenches[first:])
 
     @property

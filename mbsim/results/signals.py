@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -25,7 +25,7 @@ from mbsim.arrays.codes import (
 from mbsim.results.blocks import Block, Table, events_table, nothing
 from mbsim.results.elements import GROUPS, acting, facts
 from mbsim.results.forces import Forces
-from mbsim.results.graphics import about_graphics, graphics_of
+from mbsim.results.graphics import about_graphics, graphics_later
 from mbsim.results.motion import motion
 from mbsim.results.requests import columns_of, measures_of, request_table
 from mbsim.results.signal_filter import SignalFilter
@@ -93,7 +93,7 @@ class Before(NamedTuple):
     """What a file says before its first row: arguments of `Store.update`."""
 
     values: dict[str, Table]
-    constants: dict[str, Table]
+    constants: dict[str, Callable[[], Table]]
     attributes: dict[str, dict[str, Any]]
 
 
@@ -104,7 +104,7 @@ def before_rows(system: System, asked: SignalFilter, pictures: bool = True) -> B
     about = about_graphics(system.model, system.placement)
     return Before(
         facts_of(system, asked),
-        graphics_of(system.model, system.placement),
+        graphics_later(system.model, system.placement),
         {**without_rows(system), "graphics": dict(about)},
     )
 

@@ -166,7 +166,7 @@ class Store:
         self,
         rows: Mapping[str, Table] | None = None,
         values: Mapping[str, Any] | None = None,
-        constants: Mapping[str, Table] | None = None,
+        constants: Mapping[str, Callable[[], Table]] | None = None,
         attributes: Mapping[str, Mapping[str, Any]] | None = None,
         remove: Iterable[str] = (),
         last: bool = False,
@@ -180,7 +180,7 @@ class Store:
         values : mapping
             Datasets to write whole, in the place of those of their names.
         constants : mapping
-            Datasets that are written once, compressed where they are not small.
+            What makes datasets that are written once, compressed where they are not small.
         attributes : mapping of mapping
             Attributes of datasets and of groups, which are made if they are not there.
         remove : iterable of str
@@ -206,7 +206,8 @@ class Store:
             self._growing = self._growing or bool(rows)
             for name, value in (values or {}).items():
                 self._put(file, name, np.asarray(value))
-            for name, table in (constants or {}).items():
+            for name, make in (constants or {}).items():
+                table = make()
                 how = {"compression": "gzip", "shuffle": True} if table.nbytes > _SMALL else {}
                 file.create_dataset(name, data=table, **how)
             for name, facts in attributes.items():

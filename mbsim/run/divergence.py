@@ -36,8 +36,11 @@ RETURN_SECONDS = 0.1
 def next_budget(budget: int, done: int, elapsed: float) -> int:
     """Return for how many evaluations to call next, after one that did so many in `elapsed` [s].
 
-    At most four times as many as before: the first calls also compile or load code.
+    At most four times as many as before: the first calls also compile or load code. One that came
+    back for something else before it did any says nothing.
     """
+    if not done:
+        return budget
     wanted = RETURN_SECONDS * done / max(elapsed, 1e-9)
     return int(min(max(wanted, 1.0), 4.0 * budget))
 

@@ -198,7 +198,7 @@ def _run(model: Model, options: Options) -> Results:
     """Run a model; see `simulate`."""
     from mbsim.compile_model.scratch import with_points
     from mbsim.core import jit
-    from mbsim.results.log import RunLog
+    from mbsim.results.log import NoLog, RunLog
     from mbsim.results.recorder import Recorder
     from mbsim.results.resume import completed
 
@@ -228,7 +228,7 @@ def _run(model: Model, options: Options) -> Results:
     except ModelError:
         recorder.abandon()
         raise
-    log = RunLog(system, attributes, recorder.directory, options.resume)
+    log = NoLog() if folder is None else RunLog(system, attributes, folder, options.resume)
     begin_log(log, system, (*said, *settings.notes, *_advice(model, settings)))
     status, reason = "failed", ""
     with part("build"):

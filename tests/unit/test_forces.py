@@ -499,7 +499,7 @@ def test_log_of_a_mechanism(tmp_path: Path) -> None:
     nothing = dataclasses.replace(request("MARKER_FORCE", 21, 11), id=9)
     system = fake_system_of(model_of(tmp_path / "deck", request("MARKER_FORCE", 21, 31), nothing))
     add_rows(system, 0, 4)
-    recorder = Recorder(system, SETTINGS, None)
+    recorder = Recorder(system, SETTINGS, tmp_path)
     recorder.take()
     lines = logged(system, recorder.watch)
     recorder.close("finished", STATS, system.scene.log.contacts).close()

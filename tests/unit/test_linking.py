@@ -536,12 +536,14 @@ def test_who_uses_an_array_is_counted_only_where_some_are_made():
     signature = float64(int64, int64)
     for function, allocates in ((passes_on, False), (passes_on, True), (makes, True)):
         jit._kept.pop((function, signature), None)
+        jit._known.clear()
         found = jit.address(function, signature, allocates)
         kept = str(jit._kept[function, signature]._library._final_module)
         assert ("NRT_incref" in kept or "NRT_decref" in kept) == (function is makes or allocates)
         called = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_int64, ctypes.c_int64)(found)
         assert called(values.ctypes.data, 3) == 3.0
     del jit._kept[makes, signature]
+    jit._known.clear()
     with pytest.raises(TypingError):
         jit.address(makes, signature)
 

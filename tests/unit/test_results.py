@@ -123,7 +123,7 @@ def test_many_writes_give_the_file_of_one(tmp_path: Path, monkeypatch: Any) -> N
 
 def test_take_empties_the_rows(tmp_path: Path) -> None:
     system = fake_system(tmp_path / "deck")
-    recorder = Recorder(system, SETTINGS, None)
+    recorder = Recorder(system, SETTINGS, tmp_path)
     add_rows(system, 0, 5)
     recorder.take()
     assert list(system.scene.rows.used) == [0, 0, 0]

@@ -75,6 +75,14 @@ def require(script: Script, name: str, element: str, attribute: str) -> None:
         )
 
 
+def _takes(function: Any, count: int) -> bool:
+    """Return whether a function has so many arguments and no others, which is soon seen."""
+    if type(function) is not types.FunctionType or vars(function):
+        return False
+    code = function.__code__
+    return code.co_argcount == count and not code.co_kwonlyargcount
+
+
 def user_function(
     script: Script, name: str, element: str, arguments: str = CFFSUB
 ) -> Callable[..., Any]:
@@ -84,6 +92,8 @@ def user_function(
     if not callable(function):
         kind = type(function).__name__
         raise ModelError(f"{element}: {name} in {script.path} is a {kind}, not a function")
+    if _takes(function, count):
+        return function  # type: ignore[no-any-return]
     try:
         signature = inspect.signature(function)
     except (TypeError, ValueError):  # some functions written in C tell nothing

@@ -1,0 +1,93 @@
+"""What a run costs beside its loop, in a process that runs a deck many times with other values.
+
+    python tests/bench/run_overhead.py [RUNS]
+
+prints a row for each way of running: processor time of a run, of its loop, and what is beside it,
+the least of five rounds [ms]. `simulate` is called with another mass each time; a sweep's runs are
+those of a study in this process, of which a mass and a law's damping are drawn.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from unittest import mock
+
+import mbsim
+from mbsim.run.loop import Runner
+from mbsim.studies.study import read_study
+from mbsim.studies.worker import run_one
+
+DECK = Path(__file__).parents[2] / "models" / "bowling_ball.xml"
+ROUNDS = 5
+STUDY = """
+[study]
+model = "{deck}"
+design = "latin_hypercube"
+runs = {runs}
+
+[parameters.mass]
+path = "Body_Rigid[2].mass"
+low = 4.9
+high = 5.1
+
+[parameters.damping]
+path = "Force_Contact[301].damping"
+low = 100.0
+high = 300.0
+
+[outputs.x]
+signal = "bodies/2/position/x"
+reduce = "last"
+"""
+
+
+def measured(run: Callable[[int], object], runs: int) -> tuple[float, float]:
+    """Return processor time of a run and of its loop [ms]: of the best round."""
+    seconds: list[float] = []
+    stats = Runner.stats
+
+    def kept(self: Runner, *times: float) -> dict[str, float]:
+        seconds.append(self.loop_seconds)
+        return stats(self, *times)
+
+    found = []
+    with mock.patch.object(Runner, "stats", kept):
+        for k in range(20):
+            run(k)
+        for _ in range(ROUNDS):
+            seconds.clear()
+            began = time.process_time()
+            for k in range(runs):
+                run(k)
+            whole = time.process_time() - began
+            found.append((1e3 * whole / runs, 1e3 * sum(seconds) / runs))
+    return min(found, key=lambda each: each[0] - each[1])
+
+
+def main() -> None:
+    """Print the table."""
+    runs = int(sys.argv[1]) if len(sys.argv) > 1 else 200
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "study.toml"
+        file.write_text(STUDY.format(deck=DECK, runs=runs), encoding="utf-8")
+        study = read_study(file)
+        model = mbsim.read_model(DECK)
+        ways: dict[str, Callable[[int], object]] = {
+            "simulate, deck": lambda k: mbsim.simulate(
+                DECK, overrides={"Body_Rigid[2].mass": 5.0 + 1e-4 * k}
+            ),
+            "simulate, model": lambda k: mbsim.simulate(model),
+            "sweep": lambda k: run_one(study, study.case(k % runs)),
+        }
+        print(f"{'':16} {'run':>6} {'loop':>6} {'beside':>6}")
+        for name, run in ways.items():
+            whole, loop = measured(run, runs)
+            print(f"{name:16} {whole:6.2f} {loop:6.2f} {whole - loop:6.2f}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
