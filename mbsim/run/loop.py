@@ -258,6 +258,15 @@ class Runner:
             if self.method.counts[scheme.EVALUATIONS] > self.most_evaluations:
                 raise TooMuchWork(f"more than {self.most_evaluations} evaluations")
 
+    def _allowed(self, budget: int) -> int:
+        """Return for how many evaluations to call: one more than the run may have is too many."""
+        if self.most_evaluations is None:
+            return budget
+        from mbsim.integrators import scheme
+
+        left = self.most_evaluations - int(self.method.counts[scheme.EVALUATIONS])
+        return max(1, min(budget, left + 1))
+
     def _begin_stage(self, stage: Stage) -> bool:
         """Begin one Simulate statement with its first row; return whether it goes on."""
         from mbsim.integrators import scheme
@@ -382,7 +391,7 @@ class Runner:
                 min(self.sensing.h_max, self.timetable.longest),
                 stage.h_min,
                 self.sensing.times,
-                budget,
+                self._allowed(budget),
             )
             elapsed = time.perf_counter() - began
             self.loop_seconds += elapsed

@@ -1,4 +1,4 @@
-"""A run in a process that has run other values of its deck is that of a fresh process, bit by bit."""
+"""A run in a process that has run other values of its deck is that of a fresh process, exactly."""
 
 from __future__ import annotations
 
