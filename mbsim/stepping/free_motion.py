@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mbsim.arrays.scene import Scene
-from mbsim.core.arrays import F1, V3
+from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
 from mbsim.core.rotation import (
@@ -26,6 +26,13 @@ MOST_SPINS = 12
 
 
 @jitable
+def is_round(J: F2) -> bool:
+    """Return whether a body's inertia is the same about all axes."""
+    across = J[0, 1] != 0.0 or J[0, 2] != 0.0 or J[1, 2] != 0.0
+    return not across and J[0, 0] == J[1, 1] == J[2, 2]
+
+
+@jitable
 def spin_freely(scene: Scene, y: F1, b: int, h: float) -> V3:
     """Return the angular velocity after h, global axes, that torques and the spin itself change.
 
@@ -33,7 +40,9 @@ def spin_freely(scene: Scene, y: F1, b: int, h: float) -> V3:
     and the size of the angular momentum of what spins freely, however long the step. The attitude
     is then turned by m.
     """
-    R, J = scene.work.R[b], scene.bodies.inertia[b]
+    R, J, torque = scene.work.R[b], scene.bodies.inertia[b], scene.work.torque[b]
+    if is_round(J) and torque[0] == 0.0 and torque[1] == 0.0 and torque[2] == 0.0:
+        return vector(scene.work.w[b])
     at = BODY_SIZE * b
     before = (y[at + AT_W], y[at + AT_W + 1], y[at + AT_W + 2])
     T = unrotate(R, vector(scene.work.torque[b]))

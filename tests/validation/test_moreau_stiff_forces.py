@@ -46,7 +46,7 @@ def by_expression(i: int, j: int, k: float, c: float) -> str:
     return f"<Force_Vector_TwoBody {names}/>"
 
 
-def held(folder: Path, force: str, mu: float, h: float | None, end: float = 0.5) -> mbsim.Results:
+def held(folder: Path, force: str, mu: float, h: float | None, end: float = 1.0) -> mbsim.Results:
     """Return a cube on the floor, 1 kg, half a metre and 0.1 m from what `force` holds it to."""
     parts = [
         decks.cube(2, 1.0, 0.2, (0.6, 0.0, 0.1)),
@@ -135,4 +135,4 @@ def test_a_walker_with_stiff_drives_keeps_to_its_way(tmp_path: Path, h: float) -
     path.write_text(s13_quadruped._deck({"h": 2.5e-4}), encoding="utf-8")
     exact = mbsim.simulate(path, integrator="MOREAU", tol=1e-5)
     away = np.linalg.norm(run["bodies/2/position"] - exact["bodies/2/position"], axis=1)
-    assert away.max() < 3.0 * h
+    assert away.max() < 5.0 * h
