@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import mbsim
 from helpers import rigid_decks as decks
 from helpers.folders import MODELS
 from mbsim.bench import deck as text
+from mbsim.bench.scenes import s13_quadruped
 from mbsim.errors import Interrupted, ModelError
 
 G = 9.81
@@ -146,9 +148,13 @@ def test_what_moreau_cannot_run_is_refused_by_name(tmp_path: Path) -> None:
         mbsim.simulate(model, integrator="MOREAU")
 
 
-def test_a_resumed_run_gives_the_same_bits(tmp_path: Path) -> None:
-    """Impulses and identities of points are in the checkpoint."""
-    model = decks.stack(tmp_path, [1.0, 1.0, 2.0], 0.3, 0.005)
+@pytest.mark.parametrize("driven", [False, True])
+def test_a_resumed_run_gives_the_same_bits(tmp_path: Path, driven: bool) -> None:
+    """Impulses, identities of points and what implicit forces keep are in the checkpoint."""
+    model: Any = decks.stack(tmp_path, [1.0, 1.0, 2.0], 0.3, 0.005)
+    if driven:
+        model = tmp_path / "quadruped.xml"
+        model.write_text(s13_quadruped.SCENES[0].deck({}), encoding="utf-8")
     whole = mbsim.simulate(model, integrator="MOREAU", output=tmp_path / "whole")
     calls = 0
 
