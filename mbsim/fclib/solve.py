@@ -166,7 +166,7 @@ def _by_continuation(stuck: Result, end: float) -> Result:
             guess = Solution(found.u, found.r)
             found = solve(other, stuck.tol, guess=guess, strict=stuck.strict, max_seconds=left)
         if found.status == "solved":
-            found.problem, found.history = problem, stuck.history + found.history
+            found.problem, found.history = problem, [*stuck.history, *found.history]
             found.iterations += stuck.iterations
             return found
     return stuck
