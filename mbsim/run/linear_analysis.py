@@ -14,8 +14,6 @@ from mbsim.reader.units import symbol
 from mbsim.results.linear import GROUP, LinearModel, from_tables
 from mbsim.run import checkpoint
 from mbsim.run.inputs import Inputs
-from mbsim.run.linear_model import linearize
-from mbsim.run.statics import standing_still
 
 if TYPE_CHECKING:
     from mbsim.model.elements import Linear, Model
@@ -105,6 +103,10 @@ class LinearAnalyses:
 
         Where bodies `rested`, motions hold them as they do in a static analysis.
         """
+        # what most runs do not ask for
+        from mbsim.run.linear_model import linearize
+        from mbsim.run.statics import standing_still
+
         here = _Here(run)
         still = standing_still(run.system, run.time) if rested else nullcontext()
         with still:

@@ -271,7 +271,6 @@ class Runner:
         """Begin one Simulate statement with its first row; return whether it goes on."""
         from mbsim.integrators import scheme
         from mbsim.run.start import check_kinematic, limit_first
-        from mbsim.run.statics import balance_bodies
 
         method, simulation = self.method, stage.simulation
         if self.stage > 0:
@@ -293,6 +292,8 @@ class Runner:
         if simulation.analysis_type == "KINEMATIC":
             check_kinematic(self.system, simulation)
         if stage.is_static:
+            from mbsim.run.statics import balance_bodies
+
             balance_bodies(self.system, self.hooks, simulation, method.y, method.k[0], self.say)
         if stage.is_linear:
             rested = self.commands.rested(self.stage)

@@ -26,6 +26,8 @@ UNNEEDED = (
     "mbsim.manual",
     "mbsim.plugins.compile",
     "mbsim.reader.adm",
+    "mbsim.run.linear_model",
+    "mbsim.run.statics",
     "numba.cuda",
     "numba.np.arraymath",
     "numba.np.linalg",
