@@ -151,7 +151,7 @@ def test_what_moreau_cannot_run_is_refused_by_name(tmp_path: Path) -> None:
 @pytest.mark.parametrize("driven", [False, True])
 def test_a_resumed_run_gives_the_same_bits(tmp_path: Path, driven: bool) -> None:
     """Impulses, identities of points and what implicit forces keep are in the checkpoint."""
-    model: Any = decks.stack(tmp_path, [1.0, 1.0, 2.0], 0.3, 0.005)
+    model: Any = decks.stack(tmp_path, [1.0, 1.0, 2.0], 2.0, 0.002)
     if driven:
         model = tmp_path / "quadruped.xml"
         model.write_text(s13_quadruped.SCENES[0].deck({}), encoding="utf-8")
