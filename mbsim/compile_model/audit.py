@@ -108,7 +108,8 @@ def audit(
         friction_at,
         # of built-in laws none but those with memory looks at X
         ((laws.memory > 0) | (laws.reads_x == 1) & _in(contacts, with_user)).astype(np.int64),
-        (np.isin(applied.form, FRICTIONS) | (applied.keeps == 1)).astype(np.int64),
+        np.array([form in FRICTIONS for form in applied.form.tolist()], dtype=np.int64)
+        | (applied.keeps == 1),
         np.zeros((nc, 3)),
         np.zeros(len(applied.form)),
         found,

@@ -122,12 +122,13 @@ def pack(group: NamedTuple) -> np.ndarray[Any, np.dtype[np.int64]]:
     words: list[int] = []
     arrays: list[np.ndarray[Any, Any]] = []
     _gather(group, arrays)
+    add = words.append
     for array in arrays:
         if not array.flags.c_contiguous:
             raise ValueError("a packed array must be C-contiguous")
         # `__array_interface__` and `ctypes` make objects for it, in ten times the time
-        words.append(_data_at(id(array) + _DATA).value or 0)
-        words.extend(array.shape)
+        add(_data_at(id(array) + _DATA).value or 0)
+        words += array.shape
     return np.array(words, dtype=np.int64)
 
 

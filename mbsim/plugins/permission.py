@@ -123,20 +123,20 @@ def limited(
     ModelError
         Where this system, or this thread, has no alarm to end a call with.
     """
-    over = threading.Event()
-    watch = threading.Thread(target=_watch, args=(over, tell), daemon=True)
     main = threading.current_thread() is threading.main_thread()
     if timeout and not (main and hasattr(signal, "setitimer")):
         raise ModelError("plugin_timeout: only in the main thread of a POSIX system")
     before = signal.signal(signal.SIGALRM, _end_call) if timeout else None
     _limits.timeout, outer = timeout or 0.0, _limits.timeout
-    if interpreted:
-        watch.start()
+    over = threading.Event() if interpreted else None
+    if over is not None:
+        threading.Thread(target=_watch, args=(over, tell), daemon=True).start()
     try:
         with _bounded_memory():
             yield
     finally:
-        over.set()
+        if over is not None:
+            over.set()
         _limits.timeout = outer
         if timeout:
             signal.signal(signal.SIGALRM, before)

@@ -23,6 +23,16 @@ from mbsim.expressions.parse import parse
 from mbsim.model.elements import ArrayOfNumbers, Request, Spline
 from mbsim.reader.xml import read_model
 
+
+def test_a_packed_group_says_what_numpy_says_of_its_arrays():
+    arrays = (np.zeros((3, 4)), np.zeros(0), (np.zeros((2, 0, 3)), np.arange(5)), np.zeros((1, 1)))
+    flat = (*arrays[:2], *arrays[2], arrays[3])
+    words = [word for a in flat for word in (a.__array_interface__["data"][0], *a.shape)]
+    assert pack(arrays).tolist() == words
+    with pytest.raises(ValueError, match="C-contiguous"):
+        pack((np.zeros((3, 4)).T,))
+
+
 X = (0.0, 0.1, 0.25, 0.5, 0.6, 1.0)
 Y = (1.0, 3.0, 2.0, 2.5, -1.0, 0.5)
 HIGH = (2.0, 2.0, 1.0, 0.0, 4.0, 4.5)

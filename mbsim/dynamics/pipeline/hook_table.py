@@ -78,7 +78,7 @@ def _of(module: str, name: str) -> Callable[[Scene], Callable[..., Any]]:
 
 def _any(table: str, column: str) -> Callable[[Scene, Method], bool]:
     """Return what says whether a column of a scene's table has any entry that is not 0."""
-    return lambda scene, method: bool(np.any(getattr(getattr(scene, table), column)))
+    return lambda scene, method: bool(getattr(getattr(scene, table), column).any())
 
 
 def _rows(table: str, column: str) -> Callable[[Scene, Method], bool]:
