@@ -276,8 +276,8 @@ def rigid_mechanism(system: System, fixed: bool, tol: float) -> Made:
     if coupled or len(scene.states.program) > 0:
         if nb > MOST_BODIES:
             found.said.append(
-                f"forces are taken at the begin of steps: {nb} bodies are more than the "
-                f"{MOST_BODIES} whose forces are implicit"
+                f"forces are explicit, and stiff ones bound the step: {nb} bodies are more than "
+                f"the {MOST_BODIES} whose forces may be implicit"
             )
             coupled = []
         else:

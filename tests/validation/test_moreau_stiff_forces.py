@@ -126,6 +126,28 @@ def test_a_stiff_state_of_the_users_follows(tmp_path: Path, h: float | None) -> 
     assert np.abs(results["requests/1"][:, 0]).max() < 1e-2
 
 
+def test_forces_of_very_many_bodies_are_explicit_and_that_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The linear systems keep a table of all pairs of bodies."""
+    monkeypatch.setattr("mbsim.stepping.setup.MOST_BODIES", 0)
+    parts = [
+        decks.cube(2, 1.0, 0.2, (0.6, 0.0, 0.1)),
+        text.marker(11, 1, (0.0, 0.0, 0.1)),
+        text.contact(301, [200], [100], **decks.rubbed(0.0)),
+        text.gravity(),
+        spring(20, 11, 100.0, 2.0),
+    ]
+    model = decks.model(tmp_path, parts, 0.2, 0.01)
+    explicit = mbsim.simulate(model, integrator="MOREAU", output=tmp_path / "few")
+    log = next((tmp_path / "few").glob("*.log")).read_text(encoding="utf-8")
+    assert "forces are explicit, and stiff ones bound the step: 1 bodies are more than" in log
+    monkeypatch.undo()
+    implicit = mbsim.simulate(model, integrator="MOREAU")
+    x = "bodies/2/position"
+    assert np.abs(explicit[x] - implicit[x]).max() < 1e-4
+
+
 @pytest.mark.parametrize("h", [1e-2, 5e-3, 2e-3])
 def test_a_walker_with_stiff_drives_keeps_to_its_way(tmp_path: Path, h: float) -> None:
     """A drive's damper takes off what its link has within 0.7 ms; steps may be longer."""
