@@ -38,25 +38,36 @@ class Hook(IntEnum):
     STICKING = 14  # contacts whose friction holds without give: `Sticking`
     HIGHER_PAIRS = 15  # equations of points and curves that stay on curves and surfaces
     RELATIONS = 16  # equations that are a user's relation of terms
-    REACTION_FORCES = 17  # forces by reactions: friction in joints, expressions of them
-    EVALUATE = 18  # the whole rhs
-    TANGENT = 19  # no hook: where the packed arrays of `compile_model.tangent` are
-    BEND = 20  # how forces of equations turn with the bodies
-    CONTACT_SLOPES = 21  # derivatives of contacts: `ContactSlopes`
-    FACE_SLOPES = 22  # of flat faces that are one incident: `FaceSlopes`
-    MEMORY = 23  # friction that carries numbers in y, in linear systems: `Memory`
-    SLOPES = 24  # derivatives of forces between markers
-    MEMORY_PAIR = 25  # as MEMORY in complex systems
-    GAUGES = 26  # what is measured of contacts: `Gauges`
-    EFFECTS = 27  # what an error does to contacts, as implicit methods ask: `Effects`
-    STABILITY = 28  # what contacts bound steps of fixed length by: `Stability`
-    PASSING = 29  # how long pairs of meshes that touch pass through no wall
-    FCL_POINTS = 30  # what follows from points that FCL found: `FclPoints`
-    DRY = 31  # what Force_DryFriction and Force_Element keep of a step: `Dry`
-    ANGLES = 32  # turns of followed angles, ways along curves
-    NEAR = 33  # the lists of near pairs
-    REQUESTS = 34  # expressions of requests
-    STEPPING = 35  # no hook: where the packed arrays of `stepping.arrays` are
+    LOOPS = 17  # many loops: their multipliers and reactions, by sparse factors: `Loops`
+    REACTION_FORCES = 18  # forces by reactions: friction in joints, expressions of them
+    EVALUATE = 19  # the whole rhs
+    TANGENT = 20  # no hook: where the packed arrays of `compile_model.tangent` are
+    BEND = 21  # how forces of equations turn with the bodies
+    CONTACT_SLOPES = 22  # derivatives of contacts: `ContactSlopes`
+    FACE_SLOPES = 23  # of flat faces that are one incident: `FaceSlopes`
+    MEMORY = 24  # friction that carries numbers in y, in linear systems: `Memory`
+    SLOPES = 25  # derivatives of forces between markers
+    MEMORY_PAIR = 26  # as MEMORY in complex systems
+    GAUGES = 27  # what is measured of contacts: `Gauges`
+    EFFECTS = 28  # what an error does to contacts, as implicit methods ask: `Effects`
+    STABILITY = 29  # what contacts bound steps of fixed length by: `Stability`
+    PASSING = 30  # how long pairs of meshes that touch pass through no wall
+    FCL_POINTS = 31  # what follows from points that FCL found: `FclPoints`
+    DRY = 32  # what Force_DryFriction and Force_Element keep of a step: `Dry`
+    ANGLES = 33  # turns of followed angles, ways along curves
+    NEAR = 34  # the lists of near pairs
+    REQUESTS = 35  # expressions of requests
+    STEPPING = 36  # no hook: where the packed arrays of `stepping.arrays` are
+
+
+class Loops(IntEnum):
+    """What many loops are asked for."""
+
+    WEIGH = 0  # find whether sparse factors are faster for the equations in use
+    FACTOR = 1  # factor what the equations in use and joints do to each other
+    SOLVE = 2  # multipliers of `Sweep.rhs`
+    STRESS = 3  # factor how joints and equations would carry loads if all were equally stiff
+    RELIEVE = 4  # take self-stresses out of reactions
 
 
 class Contacts(IntEnum):

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from mbsim.arrays.graph import ConstraintGraph
 from mbsim.arrays.model import (
     Angles,
     Applied,
@@ -70,6 +71,7 @@ class Scene(NamedTuple):
     tree: Tree
     equations: Equations
     connections: Connections
+    graph: ConstraintGraph
     world: World
     scales: Scales
     state: State

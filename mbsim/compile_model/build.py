@@ -22,6 +22,7 @@ from mbsim.arrays.scratch import Rows
 from mbsim.compile_model.acting import Acting, acting
 from mbsim.compile_model.audit import audit
 from mbsim.compile_model.contacts import ContactTables, contact_tables, kinds_table
+from mbsim.compile_model.graph import make_graph
 from mbsim.compile_model.gravity import Pull
 from mbsim.compile_model.groups import Groups, find_groups, natural_speed
 from mbsim.compile_model.markers import MarkerTable, body_rows
@@ -356,6 +357,7 @@ def _scene(
         tree=mechanism.tree,
         equations=mechanism.equations,
         connections=mechanism.connections,
+        graph=make_graph(mechanism.tree, mechanism.equations, mechanism.connections, markers),
         world=_world(acts, judged, accumulators),
         scales=_group_scales(judged.groups),
         state=start_state(n, contacts.graphics, table.start_angles(), mechanism.along, residuals),

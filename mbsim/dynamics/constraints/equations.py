@@ -38,7 +38,7 @@ from mbsim.arrays.codes import (
     USUAL,
     WHOLE,
 )
-from mbsim.arrays.hooks import Hook, Sticking, answer_of, note_failure
+from mbsim.arrays.hooks import Hook, Loops, Sticking, answer_of, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1, F2, V3
@@ -243,34 +243,35 @@ def fill_matrix(scene: Scene) -> None:
 
 
 @jitable
-def factor_matrix(scene: Scene, t: float) -> None:
-    """Replace A by L, A = L L'; an equation that those before it imply gets no multiplier.
+def pivot_of(scene: Scene, t: float, e: int, left: float, passing: bool) -> float:
+    """Return the root of the pivot of equation e, of which so much is left; note the least.
 
     A pivot d stands as d (1 + 1/x^8), x being d over a part of the usual ones: itself where d
     is large, infinite where it is 0, smooth between.
     """
+    quality, size = scene.sweep.quality, scene.sweep.size[e] ** 2
+    released = passing and not is_sticking(scene, e, t)
+    if not released:
+        quality[PIVOT] = min(quality[PIVOT], left / size)
+    part = left / (NAUGHT * quality[USUAL] * size) if quality[USUAL] > 0.0 else math.inf
+    if part < 1e-4 or released:
+        return math.inf
+    return math.sqrt(left * (1.0 + part**-8) if part < 100.0 else left)
+
+
+@jitable
+def factor_matrix(scene: Scene, t: float) -> None:
+    """Replace A by L, A = L L'; an equation that those before it imply gets no multiplier."""
     A, first, n = scene.sweep.A, scene.sweep.skyline, active_count(scene)
-    usual, least = scene.sweep.quality[USUAL], 1.0
     passing = passes_fold(scene, t)
+    scene.sweep.quality[PIVOT] = 1.0
     for i in range(n):
         e = scene.equations.active[i]
-        size = scene.sweep.size[e] ** 2
-        released = passing and not is_sticking(scene, e, t)
         for j in range(first[i], i + 1):
             total = A[i, j]
             for k in range(max(first[i], first[j]), j):
                 total -= A[i, k] * A[j, k]
-            if j < i:
-                A[i, j] = total / A[j, j]
-                continue
-            if not released:
-                least = min(least, total / size)
-            part = total / (NAUGHT * usual * size) if usual > 0.0 else math.inf
-            if part < 1e-4 or released:
-                A[i, i] = math.inf
-            else:
-                A[i, i] = math.sqrt(total * (1.0 + part**-8) if part < 100.0 else total)
-    scene.sweep.quality[PIVOT] = least
+            A[i, j] = total / A[j, j] if j < i else pivot_of(scene, t, e, total, passing)
 
 
 @jitable
@@ -290,6 +291,25 @@ def solve_matrix(scene: Scene) -> None:
 
 
 @jitable
+def factor_equations(scene: Scene, t: float) -> None:
+    """Make ready to solve for multipliers: of the equations in use, or of whole loops."""
+    if scene.graph.in_use[0] == 1:
+        call_int(scene.world.hooks[Hook.LOOPS], (scene, Loops.FACTOR, t, scene.sweep.rhs))
+    else:
+        fill_matrix(scene)
+        factor_matrix(scene, t)
+
+
+@jitable
+def solve_equations(scene: Scene) -> None:
+    """Return the multipliers of `rhs`, by the equations in use."""
+    if scene.graph.in_use[0] == 1:
+        call_int(scene.world.hooks[Hook.LOOPS], (scene, Loops.SOLVE, 0.0, scene.sweep.rhs))
+    else:
+        solve_matrix(scene)
+
+
+@jitable
 def hold(scene: Scene, t: float, y: F1) -> None:
     """Fill the accelerations of all bodies of the tree under joints and equations."""
     load(scene)
@@ -297,8 +317,7 @@ def hold(scene: Scene, t: float, y: F1) -> None:
     if active_count(scene) == 0:
         return
     fill_equations(scene, t, y)
-    fill_matrix(scene)
-    factor_matrix(scene, t)
+    factor_equations(scene, t)
     impose(scene, t)
 
 
@@ -319,7 +338,7 @@ def impose(scene: Scene, t: float) -> None:
     for r in range(n):
         e = active[r]
         sweep.rhs[r] = -sweep.rate[e, GAMMA] - along_motion(scene, e)
-    solve_matrix(scene)
+    solve_equations(scene)
     # what is foreseen stands in for what equations that are released no longer ask for
     ahead = passes_fold(scene, t)
     if ahead:
@@ -327,7 +346,7 @@ def impose(scene: Scene, t: float) -> None:
         for r in range(n):
             sweep.wanted[r] = sweep.multiplier[r]
             sweep.rhs[r] = along(scene, active[r], sweep.answer, -1)
-        solve_matrix(scene)
+        solve_equations(scene)
     load(scene)
     for r in range(n):
         if ahead:

@@ -13,9 +13,8 @@ from mbsim.core.rotation import add, cross, vector
 from mbsim.dynamics.constraints.equations import (
     add_wrench,
     along,
-    factor_matrix,
-    fill_matrix,
-    solve_matrix,
+    factor_equations,
+    solve_equations,
 )
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.projection import prepare_equations
@@ -66,7 +65,7 @@ def answer_impulses(scene: Scene, wrench: F1) -> None:
     if n > 0:
         for r in range(n):
             sweep.rhs[r] = -along(scene, active[r], sweep.answer, -1)
-        solve_matrix(scene)
+        solve_equations(scene)
         load_impulses(scene, wrench)
         for r in range(n):
             add_wrench(scene, active[r], sweep.multiplier[r])
@@ -79,5 +78,4 @@ def make_ready(scene: Scene, t: float, y: F1) -> None:
     """Fill all that impulses at y need."""
     prepare_equations(scene, t, y)
     if active_count(scene) > 0:
-        fill_matrix(scene)
-        factor_matrix(scene, t)
+        factor_equations(scene, t)

@@ -16,11 +16,15 @@ def active_count(scene: Scene) -> int:
 @jitable
 def is_active(scene: Scene, e: int) -> bool:
     """Return whether equation e is in use."""
-    active = scene.equations.active
-    for r in range(active_count(scene)):
-        if active[r] == e:
-            return True
-    return False
+    # those in use ascend
+    active, first, end = scene.equations.active, 0, active_count(scene)
+    while first < end:
+        middle = (first + end) // 2
+        if active[middle] < e:
+            first = middle + 1
+        else:
+            end = middle
+    return first < active_count(scene) and active[first] == e
 
 
 @jitable

@@ -17,10 +17,9 @@ from mbsim.dynamics.constraints.equations import (
     MISMATCH,
     RESIDUAL,
     add_wrench,
-    factor_matrix,
+    factor_equations,
     fill_equations,
-    fill_matrix,
-    solve_matrix,
+    solve_equations,
 )
 from mbsim.dynamics.constraints.folding import is_sticking
 from mbsim.dynamics.constraints.in_use import active_count
@@ -52,7 +51,7 @@ def correct(scene: Scene, level: int, column: int) -> None:
     for r in range(n):
         held = scene.equations.level[active[r]] >= level
         sweep.rhs[r] = -sweep.rate[active[r], column] if held else 0.0
-    solve_matrix(scene)
+    solve_equations(scene)
     push(scene)
 
 
@@ -163,8 +162,7 @@ def close_loops(scene: Scene, t: float, y: F1) -> None:
     """
     prepare_equations(scene, t, y)
     note_drift(scene, 2, RESIDUAL, FORGIVEN)
-    fill_matrix(scene)
-    factor_matrix(scene, t)
+    factor_equations(scene, t)
     for _ in range(MOST_ROUNDS):
         size = largest_residual(scene, 2, RESIDUAL, t)
         if size <= CLOSED:
@@ -175,8 +173,7 @@ def close_loops(scene: Scene, t: float, y: F1) -> None:
         if size <= SMALL:
             return
         prepare_equations(scene, t, y)
-        fill_matrix(scene)
-        factor_matrix(scene, t)
+        factor_equations(scene, t)
     note_gap(scene, t)
 
 

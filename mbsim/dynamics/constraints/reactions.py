@@ -10,7 +10,9 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import AXIS_TORQUE, SCALE_LENGTH
+from mbsim.arrays.hooks import Hook, Loops
 from mbsim.arrays.scene import Scene
+from mbsim.core.address import call_int
 from mbsim.core.arrays import F1, F2
 from mbsim.core.jitable import jitable
 from mbsim.dynamics.bodies.markers import marker_axis
@@ -18,7 +20,7 @@ from mbsim.dynamics.constraints.equations import (
     add_wrench,
     along,
     fill_equation,
-    solve_matrix,
+    solve_equations,
     tree_index,
 )
 from mbsim.dynamics.constraints.in_use import active_count, is_active, is_friction, is_off
@@ -27,6 +29,8 @@ from mbsim.dynamics.constraints.tree_reactions import add_reaction, add_tree_rea
 
 #: A self-stress that others leave less of than this part is none of its own.
 _NEW = 1e-9
+#: Nanoseconds, about: of a body that answers a self-stress, of a body and joint of sparse factors.
+_ANSWER, _ROW = 45.0, 3000.0
 
 
 @jitable
@@ -77,7 +81,7 @@ def self_stress(scene: Scene, t: float, y: F1, e: int, out: F1) -> None:
         if last == 0:
             for r in range(n):
                 sweep.rhs[r] = -along(scene, active[r], sweep.answer, -1)
-            solve_matrix(scene)
+            solve_equations(scene)
     for i in range(len(out)):
         out[i] = 0.0
     add_reactions(scene, y, sweep.answer, out)
@@ -96,11 +100,44 @@ def product(scene: Scene, a: F1, b: F1) -> float:
 
 
 @jitable
+def is_implied(scene: Scene, e: int) -> bool:
+    """Return whether equation e, not of friction, is left out as others imply it."""
+    return not (is_active(scene, e) or is_friction(scene, e) or is_off(scene, e))
+
+
+@jitable
+def stresses_are_many(scene: Scene) -> bool:
+    """Return whether there are so many self-stresses that a sparse factor does it in less time.
+
+    Friction in use has no share in the norm: there they are found one by one.
+    """
+    if scene.world.hooks[Hook.LOOPS] == 0:
+        return False
+    active, count = scene.equations.active, active_count(scene)
+    implied = len(active) - 1 - count
+    for r in range(count):
+        if is_friction(scene, active[r]):
+            return False
+    each = _ANSWER * len(scene.tree.body) + 6.0 * implied * len(scene.connections.i)
+    cost = scene.graph.cost
+    return implied * each > cost[0] * (cost[1] + _ROW * len(scene.graph.body))
+
+
+@jitable
 def fill_stresses(scene: Scene, t: float, y: F1) -> int:
-    """Fill the self-stresses, orthonormal; return their number. Multipliers and p are lost."""
+    """Fill the self-stresses, orthonormal; return their number. Multipliers and p are lost.
+
+    Where they are many, -1: how joints and equations carry loads is factored instead.
+    """
+    if stresses_are_many(scene):
+        for e in range(len(scene.equations.program)):
+            if is_implied(scene, e):
+                fill_equation(scene, t, y, e)
+        call_int(scene.world.hooks[Hook.LOOPS], (scene, Loops.STRESS, t, y))
+        return -1
     stress, count = scene.sweep.stress, 0
     for e in range(len(scene.equations.program)):
-        if is_active(scene, e) or is_friction(scene, e) or is_off(scene, e):
+        if not is_implied(scene, e):
             continue
         new = stress[count]
         self_stress(scene, t, y, e, new)
@@ -130,6 +167,8 @@ def sum_reactions(scene: Scene, y: F1) -> None:
 @jitable
 def take_stresses(scene: Scene, count: int) -> None:
     """Take the self-stresses out of the reactions, so that these are the least."""
+    if count < 0:
+        call_int(scene.world.hooks[Hook.LOOPS], (scene, Loops.RELIEVE, 0.0, scene.sweep.rhs))
     out = scene.work.reaction
     for k in range(count):
         stress = scene.sweep.stress[k]

@@ -26,14 +26,16 @@ from mbsim.arrays.codes import (
     USUAL,
     WITHIN,
 )
+from mbsim.arrays.hooks import Hook, Loops
 from mbsim.arrays.scene import Scene
-from mbsim.core.arrays import F1
+from mbsim.core.address import call_int
+from mbsim.core.arrays import F1, F2, I1
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, sub, vector
 from mbsim.dynamics.constraints.equations import (
     RESIDUAL,
-    factor_matrix,
+    factor_equations,
     fill_equation,
     fill_equations,
     fill_matrix,
@@ -106,6 +108,8 @@ def fill_skyline(scene: Scene) -> None:
         while first < r and not share_tree(scene, active[first], active[r]):
             first += 1
         scene.sweep.skyline[r] = first
+    if scene.world.hooks[Hook.LOOPS] != 0:
+        call_int(scene.world.hooks[Hook.LOOPS], (scene, Loops.WEIGH, 0.0, scene.sweep.rhs))
 
 
 @jitable
@@ -149,6 +153,28 @@ def may_be_chosen(scene: Scene, e: int, pivot: float, friction: int) -> bool:
 
 
 @jitable
+def take_out(A: F2, best: int, active: I1, n: int) -> None:
+    """Take an equation that is chosen out of those that are not."""
+    for r in range(n):
+        if active[r] < 0 and A[r, best] != 0.0:
+            part = A[r, best] / A[best, best]
+            for s in range(n):
+                A[r, s] -= part * A[best, s]
+
+
+@jitable
+def use_chosen(scene: Scene, n: int) -> None:
+    """Take those of n equations into use that are not below 0."""
+    active, count = scene.equations.active, 0
+    for r in range(n):
+        if active[r] >= 0:
+            active[count] = active[r]
+            count += 1
+    active[len(active) - 1] = count
+    fill_skyline(scene)
+
+
+@jitable
 def choose(scene: Scene, t: float, y: F1) -> None:
     """Choose equations that are independent at y, where the tree has been prepared.
 
@@ -184,20 +210,14 @@ def choose(scene: Scene, t: float, y: F1) -> None:
         active[best] = -1 - active[best]
         least = min(least, pivot)
         count += 1
-        for r in range(n):
-            if active[r] < 0:
-                part = A[r, best] / pivot
-                for s in range(n):
-                    A[r, s] -= part * A[best, s]
+        take_out(A, best, active, n)
+    use_chosen(scene, n)
+    if scene.graph.in_use[0] == 1:
+        # its pivots are larger: joints that come later do not hold yet
+        factor_equations(scene, t)
+        least = sweep.quality[PIVOT]
     sweep.quality[CHOSEN] = least
     sweep.quality[USUAL] = max(sweep.quality[USUAL], least)
-    count = 0
-    for r in range(n):
-        if active[r] >= 0:
-            active[count] = active[r]
-            count += 1
-    active[len(active) - 1] = count
-    fill_skyline(scene)
 
 
 @jitable
@@ -232,8 +252,7 @@ def choose_better(scene: Scene, t: float, y: F1, least: float) -> None:
     # how near a fold is goes by the pivots of what is in use
     quality = scene.sweep.quality
     fill_equations(scene, t, y)
-    fill_matrix(scene)
-    factor_matrix(scene, t)
+    factor_equations(scene, t)
     if quality[PIVOT_THEN] > 0.0:
         quality[KEPT_PIVOT] *= quality[PIVOT] / quality[PIVOT_THEN]
         quality[PIVOT_THEN] = quality[PIVOT]

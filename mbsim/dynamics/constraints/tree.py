@@ -157,14 +157,10 @@ def fill_directions(scene: Scene, y: F1, k: int) -> None:
 
 
 @jitable
-def fill_body(scene: Scene, y: F1, k: int) -> None:
-    """Fill inertia about O and the force that velocities call for."""
-    b = scene.tree.body[k]
-    bodies, work, H = scene.bodies, scene.work, scene.sweep.H[k]
-    R, J, m = work.R[b], bodies.inertia[b], bodies.mass[b]
-    r = sub(position(scene, y, b), origin(scene, y, k))
-    for i in range(3):
-        scene.sweep.arm[k, i] = r[i]
+def fill_inertia(scene: Scene, k: int, H: F2) -> None:
+    """Fill the inertia of the body at tree index k about O; `arm` is known."""
+    b, r = scene.tree.body[k], vector(scene.sweep.arm[k])
+    R, J, m = scene.work.R[b], scene.bodies.inertia[b], scene.bodies.mass[b]
     square = dot(r, r)
     for i in range(3):
         row = (
@@ -185,6 +181,18 @@ def fill_body(scene: Scene, y: F1, k: int) -> None:
     H[1, 5] = H[5, 1] = -m * r[0]
     H[2, 3] = H[3, 2] = -m * r[1]
     H[2, 4] = H[4, 2] = m * r[0]
+
+
+@jitable
+def fill_body(scene: Scene, y: F1, k: int) -> None:
+    """Fill inertia about O and the force that velocities call for."""
+    b = scene.tree.body[k]
+    bodies, work = scene.bodies, scene.work
+    R, J, m = work.R[b], bodies.inertia[b], bodies.mass[b]
+    r = sub(position(scene, y, b), origin(scene, y, k))
+    for i in range(3):
+        scene.sweep.arm[k, i] = r[i]
+    fill_inertia(scene, k, scene.sweep.H[k])
 
     w = vector(work.w[b])
     spin = unrotate(R, w)
@@ -214,13 +222,9 @@ def factor_free(scene: Scene, k: int) -> None:
 
 
 @jitable
-def hang(scene: Scene, k: int) -> None:
-    """Factor what tree index k resists in its free directions and hang the rest, H - W'W, above."""
-    factor_free(scene, k)
-    sweep, parent = scene.sweep, scene.tree.parent[k]
-    if parent < 0:
-        return
-    above, H, W = sweep.H[parent], sweep.H[k], sweep.W[k]
+def hang_on(scene: Scene, k: int, above: F2) -> None:
+    """Add what tree index k resists beside its free directions, H - W'W, to an inertia above."""
+    H, W = scene.sweep.H[k], scene.sweep.W[k]
     for i in range(6):
         row = six(H[i])
         for q in range(scene.tree.free[k]):
@@ -228,6 +232,15 @@ def hang(scene: Scene, k: int) -> None:
             row = plus(row, -factor, w)
         for j in range(6):
             above[i, j] += row[j]
+
+
+@jitable
+def hang(scene: Scene, k: int) -> None:
+    """Factor what tree index k resists in its free directions and hang the rest above."""
+    factor_free(scene, k)
+    parent = scene.tree.parent[k]
+    if parent >= 0:
+        hang_on(scene, k, scene.sweep.H[parent])
 
 
 @jitable

@@ -102,12 +102,9 @@ def _spreads(scene: Scene, method: Method) -> bool:
     return bool(scene.contacts.spreads[patches].any())
 
 
-def _has_contact_slopes(scene: Scene, method: Method) -> bool:
-    return method.tangent is not None and _has_contacts(scene, method)
-
-
-def _has_face_slopes(scene: Scene, method: Method) -> bool:
-    return method.tangent is not None and _has_faces(scene, method)
+def _linearised(when: Callable[[Scene, Method], bool]) -> Callable[[Scene, Method], bool]:
+    """Return what says whether a scene has something, and a method asks for its derivatives."""
+    return lambda scene, method: method.tangent is not None and when(scene, method)
 
 
 def _fixes_steps(scene: Scene, method: Method) -> bool:
@@ -165,10 +162,6 @@ def _reaction_forces(scene: Scene) -> Callable[..., Any]:
 
     # forces by reactions are compiled with all that they need
     return settle if len(scene.applied.by_reactions) > 0 else add_joint_friction
-
-
-def _has_equations(scene: Scene, method: Method) -> bool:
-    return method.tangent is not None and len(scene.equations.program) > 0
 
 
 def _bend(scene: Scene) -> Callable[..., Any]:
@@ -351,6 +344,14 @@ TABLE = (
         "makes the sum of an equation's terms a user's relation of them",
     ),
     Row(
+        Hook.LOOPS,
+        _KEEPS,
+        _rows("graph", "tree"),
+        _of("pipeline.loop_hooks", "serve_loops"),
+        "does what many loops are asked for: `Loops`",
+        "0; it cannot fail",
+    ),
+    Row(
         Hook.REACTION_FORCES,
         _FORCES,
         _has_reaction_forces,
@@ -368,21 +369,21 @@ TABLE = (
     Row(
         Hook.BEND,
         _AT,
-        _has_equations,
+        _linearised(_rows("equations", "program")),
         _bend,
         "adds how forces of equations turn with the bodies",
     ),
     Row(
         Hook.CONTACT_SLOPES,
         _INT(_INT, _INT, _T, _T, _PTR),  # context, request, t, h, y
-        _has_contact_slopes,
+        _linearised(_has_contacts),
         _of("pipeline.implicit_hooks", "slopes_of_contacts"),
         "does what derivatives of contacts are asked for: `ContactSlopes`",
     ),
     Row(
         Hook.FACE_SLOPES,
         _T(_INT, _INT, _INT, _T, _T, _PTR),  # context, request, slot, two numbers, y
-        _has_face_slopes,
+        _linearised(_has_faces),
         _of("pipeline.implicit_hooks", "slopes_of_faces"),
         "does what derivatives of flat faces are asked for that are one incident: `FaceSlopes`",
         "a number; it cannot fail",
@@ -420,7 +421,7 @@ TABLE = (
     Row(
         Hook.EFFECTS,
         _T(_INT, _INT, _T, _T, _PTR, _PTR),  # context, request, t, h, error, y
-        _has_contact_slopes,
+        _linearised(_has_contacts),
         _of("pipeline.contact_hooks", "measure_effects"),
         "measures what an error does to contacts: `Effects`; of explicit methods nothing knows it",
         "the measure; a failure is noted",
