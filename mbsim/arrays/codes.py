@@ -332,6 +332,11 @@ AT_ROWS, ON_PLANE, NO_ROWS, HELD_AT_PLACES = range(4)
 #: or they are those of the polyhedron that `size` is the address of.
 AXIS_SIDES, HULL_SIDES = range(2)
 STRETCH = 2
+# columns of `Pattern.meets`: incidences of a block's row and column, and the block; of
+# `ConstraintGraph.reaction`; entries of `ConstraintGraph.cost`
+MEETS_ROW, MEETS_COLUMN, MEETS_BLOCK = range(3)
+REACTION_AT, REACTION_SIGN = range(2)
+COST_OF_SPARSE, COST_OF_LINK = range(2)
 # columns of `Rows.contact`, of each contact; force and torque take three
 CONTACT_FORCE, CONTACT_TORQUE, CONTACT_DEPTH, CONTACT_SLIP = 0, 3, 6, 7
 CONTACT_INCIDENTS, CONTACT_AREA, CONTACT_COLUMNS = 8, 9, 10

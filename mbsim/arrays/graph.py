@@ -36,7 +36,7 @@ class ConstraintGraph(NamedTuple):
 
     tree: I1  # (n,) tree index of the joint that a node holds, -1 for none
     equation: I1  # (n,) first equation of each
-    equations: I1  # (n,) their number
+    several: I1  # (n,) their number
     connection: I1  # (n,) row of `Connections`, -1 for friction
     first: I1  # (n + 1,) first incidence of each
     body: I1  # (incidences,) which of `bodies`
@@ -59,6 +59,6 @@ class ConstraintGraph(NamedTuple):
     H: tags.Scratch[F3]  # (bodies, 6, 6) inertia with all that hangs on it and is in no loop; L
     R: tags.Scratch[F3]  # (n, 6, 6) reactions of units, by rows
     u: tags.Scratch[F2]  # (n, 6) what each row carries
-    d: tags.Scratch[F2]  # (bodies, 6) displacements
+    shift: tags.Scratch[F2]  # (bodies, 6) displacements
     cost: F1  # (2,) by how much dearer sparse factors are taken to be than they are; of one of
     # `links`, in products of numbers

@@ -201,7 +201,7 @@ def make_graph(
     return ConstraintGraph(
         tree=ints([node.tree for node in at.nodes]),
         equation=ints([node.equations[0] if node.equations else 0 for node in at.nodes]),
-        equations=ints([len(node.equations) for node in at.nodes]),
+        several=ints([len(node.equations) for node in at.nodes]),
         connection=ints([node.connection for node in at.nodes]),
         first=ints(at.first),
         body=ints(at.body),
@@ -223,6 +223,6 @@ def make_graph(
         H=np.zeros((len(bodies), 6, 6)),
         R=np.zeros((n, 6, 6)),
         u=np.zeros((n, 6)),
-        d=np.zeros((len(bodies), 6)),
+        shift=np.zeros((len(bodies), 6)),
         cost=np.array([1.0, products(links, [MOST_ROWS] * len(bodies))]),
     )

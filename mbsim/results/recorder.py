@@ -131,8 +131,7 @@ class Recorder:
         check_requests(system.model)
         if asked:
             self._asked.check(names_of(system))
-        # what a run goes on from, or is built again from, is a file
-        digests = {} if directory is None else self._identity.digests
+        digests = {} if self._bare else self._identity.digests
         self._settings: dict[str, Value] = {**attributes, **digests}
         if directory is not None:
             prepare_directory(directory, system.model.name)

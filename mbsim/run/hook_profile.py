@@ -55,6 +55,7 @@ PARTS_OF_SCENE = {
     Hook.WRENCH: "forces",
     Hook.ELEMENT: "forces",
     Hook.JOINTS: "joints",
+    Hook.LOOPS: "joints",
     Hook.HIGHER_PAIRS: "joints",
     Hook.RELATIONS: "joints",
     Hook.STICKING: "joints",

@@ -231,9 +231,10 @@ def _too_large(asked: Asked, x: Numbers, sd: Numbers | None) -> list[str]:
     """Return that squares of values, over their noise, would overflow, where they would."""
     root = math.sqrt(float(asked.table.get("weight", 1.0)))
     column, largest = asked.table["column"], float(np.max(np.abs(x), initial=0.0))
+    least = 1.0 if sd is None else float(np.min(sd, initial=math.inf))
     if not largest <= _LARGEST:
         said = f"column {column!r} has values up to {largest:.3g} in the model's units"
-    elif not max(1.0, largest) * root <= _LARGEST * (1.0 if sd is None else float(np.min(sd))):
+    elif not max(1.0, largest) * root <= _LARGEST * least:
         said = f"values of column {column!r} are too large beside sd and weight"
     else:
         return []

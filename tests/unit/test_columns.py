@@ -16,7 +16,24 @@ FOLDERS = ("arrays", "compile_model", "dynamics", "integrators", "laws", "result
 #: What a number of a formula is an index of: matrices, lists of vectors, and scratch rows of them.
 FORMULAS = {
     # rotations, inertias, blocks of matrices and what they are multiplied by
-    *("R", "J", "S", "H", "A", "B", "E", "U", "P", "T", "TI", "g", "own", "inertia", "inverse"),
+    *(
+        "R",
+        "J",
+        "S",
+        "H",
+        "L",
+        "A",
+        "B",
+        "E",
+        "U",
+        "P",
+        "T",
+        "TI",
+        "g",
+        "own",
+        "inertia",
+        "inverse",
+    ),
     # tables of vectors
     *("p", "q", "net", "frames", "sticking_force", "force", "rate", "x", "skew", "relative"),
     # of Python, in which a row is what its own file says

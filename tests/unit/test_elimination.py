@@ -7,7 +7,7 @@ import pytest
 
 from mbsim.compile_model import elimination
 from mbsim.compile_model.elimination import coupled, eliminate, pattern, products
-from mbsim.dynamics.constraints import sparse_factor
+from mbsim.dynamics.loops import sparse_factor
 
 RANDOM = np.random.default_rng(3)
 #: Chain, ring, star and a net, by what belongs together.

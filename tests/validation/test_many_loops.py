@@ -157,7 +157,7 @@ def test_equations_come_after_all_joints_of_their_loop(tmp_path):
     graph, tree = (scene := of_scene(ladder(8), tmp_path)).graph, scene.tree
     when = {int(k): n for n, k in enumerate(graph.tree) if k >= 0}
     for n in range(len(graph.tree)):
-        if graph.equations[n] == 0:
+        if graph.several[n] == 0:
             continue
         for at in range(graph.first[n], graph.first[n + 1]):
             k = int(graph.bodies[graph.body[at]])

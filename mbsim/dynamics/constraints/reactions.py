@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import AXIS_TORQUE, SCALE_LENGTH
+from mbsim.arrays.codes import AXIS_TORQUE, COST_OF_LINK, COST_OF_SPARSE, SCALE_LENGTH
 from mbsim.arrays.hooks import Hook, Loops
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
@@ -120,7 +120,8 @@ def stresses_are_many(scene: Scene) -> bool:
             return False
     each = _ANSWER * len(scene.tree.body) + 6.0 * implied * len(scene.connections.i)
     cost = scene.graph.cost
-    return implied * each > cost[0] * (cost[1] + _ROW * len(scene.graph.body))
+    sparse = cost[COST_OF_LINK] + _ROW * len(scene.graph.body)
+    return implied * each > cost[COST_OF_SPARSE] * sparse
 
 
 @jitable

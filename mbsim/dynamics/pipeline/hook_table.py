@@ -347,7 +347,7 @@ TABLE = (
         Hook.LOOPS,
         _KEEPS,
         _rows("graph", "tree"),
-        _of("pipeline.loop_hooks", "serve_loops"),
+        _of("loops.hook", "serve_loops"),
         "does what many loops are asked for: `Loops`",
         "0; it cannot fail",
     ),

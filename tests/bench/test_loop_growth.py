@@ -1,6 +1,6 @@
 """Cost of an evaluation of mechanisms with many loops.
 
-python -m pytest -m bench -s tests/bench/test_many_loops.py
+python -m pytest -m bench -s tests/bench/test_loop_growth.py
 """
 
 from __future__ import annotations

@@ -12,7 +12,18 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import CHILD_AXIS, PARENT_AXIS, PIVOT, TURN_AXIS, TURN_CROSS, TURN_LOCKED
+from mbsim.arrays.codes import (
+    CHILD_AXIS,
+    COST_OF_SPARSE,
+    MEETS_BLOCK,
+    MEETS_COLUMN,
+    MEETS_ROW,
+    PARENT_AXIS,
+    PIVOT,
+    TURN_AXIS,
+    TURN_CROSS,
+    TURN_LOCKED,
+)
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import I1, V3
 from mbsim.core.jitable import jitable
@@ -20,13 +31,6 @@ from mbsim.core.rotation import add, cross, rotate, vector
 from mbsim.dynamics.constraints.equations import pivot_of
 from mbsim.dynamics.constraints.folding import passes_fold
 from mbsim.dynamics.constraints.in_use import active_count
-from mbsim.dynamics.constraints.sparse_factor import (
-    clear,
-    eliminate,
-    factor_diagonal,
-    multiply_in,
-    solve_factored,
-)
 from mbsim.dynamics.constraints.tree import (
     child_axis,
     fill_inertia,
@@ -34,6 +38,13 @@ from mbsim.dynamics.constraints.tree import (
     parent_axis,
     put,
     six,
+)
+from mbsim.dynamics.loops.sparse_factor import (
+    clear,
+    eliminate,
+    factor_diagonal,
+    multiply_in,
+    solve_factored,
 )
 
 #: Nanoseconds, about. Of equations: of a body and a free direction that answer a unit multiplier,
@@ -120,7 +131,7 @@ def fill_rows(scene: Scene, n: int, row: I1) -> int:
             for c in range(6):
                 J[r, c] = 0.0
     rows = fill_joint(scene, n) if G.tree[n] >= 0 else 0
-    for e in range(G.equation[n], G.equation[n] + G.equations[n]):
+    for e in range(G.equation[n], G.equation[n] + G.several[n]):
         if row[e] >= 0:
             fill_gradient(scene, e, rows)
             row[e] = rows
@@ -158,7 +169,8 @@ def fill_joints(scene: Scene) -> None:
             divide_by_inertia(scene, at, P.size[n])
     clear(P)
     for k in range(len(P.meets)):
-        a, b, block = P.meets[k, 0], P.meets[k, 1], P.meets[k, 2]
+        a, b = P.meets[k, MEETS_ROW], P.meets[k, MEETS_COLUMN]
+        block = P.meets[k, MEETS_BLOCK]
         multiply_in(P, block, G.Y[a], G.Y[b], P.size[G.node[a]], P.size[G.node[b]])
 
 
@@ -256,5 +268,5 @@ def cost_of_loops(scene: Scene) -> float:
 @jitable
 def weigh(scene: Scene) -> None:
     """Factor in the way that takes less time for the equations in use."""
-    dearer = scene.graph.cost[0] * cost_of_loops(scene)
+    dearer = scene.graph.cost[COST_OF_SPARSE] * cost_of_loops(scene)
     scene.graph.in_use[0] = 1 if dearer < cost_of_equations(scene) else 0

@@ -6,8 +6,8 @@ from mbsim.arrays.hooks import Loops
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import vector_at, view
 from mbsim.core.arrays import Pointer
-from mbsim.dynamics.constraints.least_reactions import fill_links, relieve
-from mbsim.dynamics.constraints.loops import factor_loops, solve_loops, weigh
+from mbsim.dynamics.loops.least_reactions import fill_links, relieve
+from mbsim.dynamics.loops.multipliers import factor_loops, solve_loops, weigh
 
 
 def serve_loops(context: int, what: int, t: float, y: Pointer) -> int:

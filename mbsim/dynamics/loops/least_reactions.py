@@ -10,21 +10,28 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import SCALE_LENGTH
+from mbsim.arrays.codes import (
+    MEETS_BLOCK,
+    MEETS_COLUMN,
+    MEETS_ROW,
+    REACTION_AT,
+    REACTION_SIGN,
+    SCALE_LENGTH,
+)
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, sub
 from mbsim.dynamics.bodies.markers import marker_point
 from mbsim.dynamics.constraints.in_use import is_friction, is_off
-from mbsim.dynamics.constraints.loops import fill_rows
-from mbsim.dynamics.constraints.sparse_factor import (
+from mbsim.dynamics.constraints.tree import origin
+from mbsim.dynamics.loops.multipliers import fill_rows
+from mbsim.dynamics.loops.sparse_factor import (
     clear,
     eliminate,
     factor_diagonal,
     solve_factored,
 )
-from mbsim.dynamics.constraints.tree import origin
 
 #: Stiffness that is added, as part of what joints give, and where they give none; how often what it
 #: does is taken away.
@@ -37,7 +44,7 @@ _OWN = 1e-9
 def fill_units(scene: Scene, y: F1, n: int) -> None:
     """Fill the reactions R of units of node n, force and torque over the length of the model."""
     G, c = scene.graph, scene.graph.connection[n]
-    at, sign = G.reaction[n, 0], float(G.reaction[n, 1])
+    at, sign = G.reaction[n, REACTION_AT], float(G.reaction[n, REACTION_SIGN])
     length, k = scene.world.scale[SCALE_LENGTH], G.bodies[G.body[at]]
     arm = sub(marker_point(scene, y, scene.connections.i[c]), origin(scene, y, k))
     for r in range(G.rows[n]):
@@ -98,8 +105,8 @@ def fill_links(scene: Scene, y: F1) -> None:
             make_orthonormal(scene, n)
     clear(P)
     for k in range(len(P.meets)):
-        a, b = P.meets[k, 0], P.meets[k, 1]
-        J, K, B = G.J[a], G.J[b], P.block[P.meets[k, 2]]
+        a, b = P.meets[k, MEETS_ROW], P.meets[k, MEETS_COLUMN]
+        J, K, B = G.J[a], G.J[b], P.block[P.meets[k, MEETS_BLOCK]]
         for r in range(G.rows[G.node[a]]):
             for i in range(6):
                 for j in range(6):
@@ -120,7 +127,7 @@ def stretch(scene: Scene, n: int, r: int) -> float:
     G, total = scene.graph, 0.0
     for at in range(G.first[n], G.first[n + 1]):
         for i in range(6):
-            total += G.J[at, r, i] * G.d[G.body[at], i]
+            total += G.J[at, r, i] * G.shift[G.body[at], i]
     return total
 
 
@@ -141,7 +148,7 @@ def displace_more(scene: Scene) -> None:
     solve_factored(P)
     for b in range(len(G.bodies)):
         for i in range(6):
-            G.d[b, i] += P.x[G.place[b], i]
+            G.shift[b, i] += P.x[G.place[b], i]
 
 
 @jitable
@@ -157,7 +164,7 @@ def relieve(scene: Scene) -> None:
             G.u[n, r] = total
     for b in range(len(G.bodies)):
         for i in range(6):
-            G.d[b, i] = 0.0
+            G.shift[b, i] = 0.0
     for _ in range(_ROUNDS):
         displace_more(scene)
     for n in range(len(G.tree)):

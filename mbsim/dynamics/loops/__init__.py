@@ -1,0 +1,1 @@
+"""Many loops of joints: their multipliers and least reactions, by sparse factors."""
