@@ -118,6 +118,23 @@ def solve(
         Give up after this long; compiling and loading do not count.
     """
     began = clock()
+    result = _solve_once(problem, tol, solver, guess, strict, max_seconds)
+    if result.reason == "stagnates" and result.solver == "AUTO":
+        result = _by_continuation(result, began + max_seconds)
+        result.solve_s = clock() - began
+    return result
+
+
+def _solve_once(
+    problem: Local | Global,
+    tol: float,
+    solver: str,
+    guess: Solution | None,
+    strict: bool,
+    max_seconds: float,
+) -> Result:
+    """Solve a problem from one start."""
+    began = clock()
     if not tol > 0.0:
         raise ModelError(f"tol {tol}: a number above 0 is allowed")
     m = problem.spacedim * len(problem.mu)
@@ -140,8 +157,6 @@ def solve(
         # that r = 0 happens to be near enough makes it no solution
         task.offer(r, error, error_q)
     result = _rounds(problem, solver, method, task, PROOF * max_seconds)
-    if guess is None and result.reason == "stagnates" and result.solver == "AUTO":
-        result = _by_continuation(result, began + max_seconds)
     result.solve_s = clock() - began
     result.condense_s = condensed - began if not plain else 0.0
     return result
@@ -164,7 +179,7 @@ def _by_continuation(stuck: Result, end: float) -> Result:
                 return stuck
             other = replace(problem, **{name: part * getattr(problem, name)})
             guess = Solution(found.u, found.r)
-            found = solve(other, stuck.tol, guess=guess, strict=stuck.strict, max_seconds=left)
+            found = _solve_once(other, stuck.tol, stuck.solver, guess, stuck.strict, left)
         if found.status == "solved":
             found.problem, found.history = problem, [*stuck.history, *found.history]
             found.iterations += stuck.iterations
@@ -204,8 +219,6 @@ def _solve_plain(
     task.offer(r, error, error_q)
     task.note("NSGS", history[:rows])
     result = _rounds(problem, "AUTO", named("AUTO"), task, PROOF * max_seconds)
-    if result.reason == "stagnates":
-        result = _by_continuation(result, began + max_seconds)
     result.solve_s = clock() - began
     return result
 

@@ -513,3 +513,11 @@ def test_heaps_of_spheres_that_hardly_roll_are_solved(seed, mu, mu_r):
     assert result.status == "solved"
     assert result.problem is problem
     assert judge(problem, result.solution).error <= 1e-8
+
+
+def test_what_a_guess_does_not_lead_to_is_solved_all_the_same():
+    problem = rolling_heap(30, 0.3, 0.005, 0)
+    first = solve(problem, 1e-2)
+    result = solve(problem, 1e-8, guess=Solution(first.u, first.r))
+    assert result.status == "solved"
+    assert judge(problem, result.solution).error <= 1e-8
