@@ -88,16 +88,16 @@ def user_function(
 ) -> Callable[..., Any]:
     """Return the function of a script after a look at whether its arguments fit."""
     count = len(arguments.split(","))
-    function = script.values[name]
+    function: Callable[..., Any] = script.values[name]
     if not callable(function):
         kind = type(function).__name__
         raise ModelError(f"{element}: {name} in {script.path} is a {kind}, not a function")
     if _takes(function, count):
-        return function  # type: ignore[no-any-return]
+        return function
     try:
         signature = inspect.signature(function)
     except (TypeError, ValueError):  # some functions written in C tell nothing
-        return function  # type: ignore[no-any-return]
+        return function
     try:
         signature.bind(*range(count))
     except TypeError as error:
@@ -107,7 +107,7 @@ def user_function(
             f"{element}: {place}: {name}{signature} cannot be called with the {count} arguments "
             f"({arguments}): {error}"
         ) from None
-    return function  # type: ignore[no-any-return]
+    return function
 
 
 def load_script(path: Path, element: str, scripts: Scripts) -> Script:
