@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ from mbsim.bench import deck as text
 from mbsim.bench.scenes import s13_quadruped
 
 WEIGHT = 9.81
+#: What writes a force between markers, by stiffness and damping.
+Make = Callable[[int, int, float, float], str]
 
 
 def spring(i: int, j: int, k: float, c: float) -> str:
@@ -63,13 +66,13 @@ def held(folder: Path, force: str, mu: float, h: float | None, end: float = 1.0)
 @pytest.mark.parametrize("make", [spring, by_expression])
 @pytest.mark.parametrize(("k", "c"), [(1e7, 1e4), (1e9, 0.0), (10.0, 1e6)])
 def test_a_block_comes_to_rest_however_stiff_what_holds_it(
-    tmp_path: Path, make: object, k: float, c: float, h: float | None
+    tmp_path: Path, make: Make, k: float, c: float, h: float | None
 ) -> None:
     """It stays within the stretch that friction holds, or creeps as the damper lets it.
 
     Steps that its own period is shorter than take the swing off it.
     """
-    results = held(tmp_path, make(20, 11, k, c), 0.3, h)  # type: ignore[operator]
+    results = held(tmp_path, make(20, 11, k, c), 0.3, h)
     x, v = results["bodies/2/position"][:, 0], results["bodies/2/velocity"][-1]
     assert np.abs(x - 0.5).max() < 0.1 + 1e-6
     if c == 0.0 and h is None:
@@ -84,11 +87,11 @@ def test_a_block_comes_to_rest_however_stiff_what_holds_it(
 
 
 @pytest.mark.parametrize("make", [spring, by_expression])
-def test_springs_that_are_not_stiff_are_of_order_two(tmp_path: Path, make: object) -> None:
+def test_springs_that_are_not_stiff_are_of_order_two(tmp_path: Path, make: Make) -> None:
     """Against the damped oscillation in closed form, on a floor without friction."""
     k, c, errors = 100.0, 2.0, []
     for h in (0.02, 0.01, 0.005):
-        results = held(tmp_path, make(20, 11, k, c), 0.0, h)  # type: ignore[operator]
+        results = held(tmp_path, make(20, 11, k, c), 0.0, h)
         t, w = results["time"], np.sqrt(k - 0.25 * c * c)
         exact = 0.1 * np.exp(-0.5 * c * t) * (np.cos(w * t) + 0.5 * c / w * np.sin(w * t))
         errors.append(np.abs(results["bodies/2/position"][:, 0] - 0.5 - exact).max())
