@@ -3,7 +3,9 @@
 Numba optimises and emits every function that another one calls, and links all of it again into
 the caller, so that a chain of n functions is optimised n times over. Here a function that only
 compiled code calls keeps the code as it was lowered. A root (what Python, or an address, calls)
-links all that it reaches, once, is optimised and emitted.
+links all that it reaches, once, is optimised and emitted. That code is its own then: nobody else
+calls it, so that LLVM takes away arguments that are not read, and puts a function in its one
+caller's place. A scene is passed on as hundreds of arguments, member by member.
 
 Numba's own linking is used where its version is not one of those that this was tested with.
 """
@@ -22,7 +24,7 @@ from numba.core.registry import cpu_target
 TESTED = ("0.68.1",)
 
 #: Part of the name of the cache's folder: code of another policy is not mixed with it.
-POLICY = "roots3" if numba.__version__ in TESTED else "all"
+POLICY = "roots4" if numba.__version__ in TESTED else "all"
 
 _ENVIRONMENT = "_ZN08NumbaEnv"
 _RECURSIVE = codegen.RuntimeLinker.PREFIX
@@ -69,6 +71,7 @@ class RootLibrary(codegen.JITCodeLibrary):
         """Link all that is reached, optimise and emit it."""
         emitted.append(self.name)
         self.lowered()  # before optimised: another root may call this one
+        own = set(_defined(self._final_module))
         reached = list(_callers_first(self))[1:]
         self._reload_init.update(*(library._reload_init for library in reached))
         for library in reached:
@@ -76,6 +79,9 @@ class RootLibrary(codegen.JITCodeLibrary):
             module = library.lowered() if raw else library._get_module_for_linking()
             self._final_module.link_in(module, preserve=True)
         self._resolve_recursion()
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.name not in own:
+                function.linkage = llvm.Linkage.internal
         self._optimize_final_module()  # type: ignore[no-untyped-call]
         self._final_module.verify()
         self._finalize_final_module()  # type: ignore[no-untyped-call]
