@@ -104,14 +104,15 @@ def sweep(p: Points, M: Motion, count: int, number: int) -> tuple[float, float]:
             end += 1
         i, j = p.body[begin, 0], p.body[begin, 1]
         if changed[i] >= number - 1 or changed[j] >= number - 1:
-            first, more = solve_pair(p, M.v, begin, end)
-            square += more
+            first, left, rounds = 0.0, 2.0, 0
+            while 1.0 < left < math.inf and rounds < (MOST_ROUNDS if end > begin + 1 else 1):
+                left, more = solve_pair(p, M.v, begin, end)
+                if rounds == 0:
+                    first = left
+                    square += more
+                rounds += 1
             if not first <= largest:
                 largest = first
-            rounds, left = 1, first
-            while end > begin + 1 and 1.0 < left < math.inf and rounds < MOST_ROUNDS:
-                left = solve_pair(p, M.v, begin, end)[0]
-                rounds += 1
             if not first <= STILL:
                 for k in range(begin, end):
                     note_change(p, changed, k, number)
