@@ -37,12 +37,13 @@ RULE_NUMBERS = 5
 ) = range(10)
 KEPT_POINT, KEPT_NORMAL, KEPT_TANGENT, KEPT_FORCE = 10, 13, 16, 19
 KEPT_COLUMNS = 22
-# entries of `Plan.number`: 1 where the error of steps is not estimated; lengths below which gaps
-# and changes of position do not count; what the solver may leave of a velocity, times h; 1 where
-# some kind of pair is not near; how fast positions are projected, see `solver.project_positions`;
-# what may be left of a velocity at most, however short a step; and part of a step's jumps that may;
-# how near to where friction yields a step is to end; the model's own time L/V; how far closing and
-# slipping may go in a step and are none; 1 where bodies at rest may sleep
+# entries of `Plan.number`: 1 where the error of steps is not estimated; the length below which gaps
+# between bodies as large as the scene do not count (`points.slop_of`); what the solver may leave of
+# a velocity, times h; 1 where some kind of pair is not near; how fast positions are projected, see
+# `solver.project_positions`; what may be left of a velocity at most, however short a step; and part
+# of a step's jumps that may; how near to where friction yields a step is to end; the model's own
+# time L/V; how far closing and slipping may go in a step and are none; 1 where bodies at rest may
+# sleep
 FIXED, SLOP, LEFT, SOME_AHEAD, PUSH_SPEED, LEFT_SPEED, LEFT_PART, NEAR, OWN_TIME = range(9)
 NOISE, MAY_SLEEP = 9, 10
 PLAN_NUMBERS = 11
@@ -154,6 +155,7 @@ class Points(NamedTuple):
     row: I1  # (m,) of the pair
     was: I1  # (m,) row of `Kept` that is the same point, -1 for none
     gap: F1  # (m,)
+    slop: F1  # (m,) gaps and depths below that do not count
     point: F2  # (m, 3)
     arm: F3  # (m, 2, 3) from the bodies' cg, when the point touches
     normal: F2  # (m, 3)
@@ -326,6 +328,7 @@ def make(
         row=whole(m),
         was=whole(m),
         gap=numbers(m),
+        slop=numbers(m),
         point=numbers(m, 3),
         arm=numbers(m, 2, 3),
         normal=numbers(m, 3),

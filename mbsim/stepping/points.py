@@ -16,8 +16,12 @@ from mbsim.dynamics.contact.forces import IGNORE_DEEPER, sides
 from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT
 from mbsim.stepping.arrays import (
     AXES,
+    LEFT,
     LIGHT,
+    OWN_TIME,
     POINTS,
+    PUSH_SPEED,
+    SLOP,
     SPIN,
     TURN,
     W_NN,
@@ -76,6 +80,20 @@ def is_point(scene: Scene, pair: int, s: int) -> bool:
 
 
 @jitable
+def slop_of(scene: Scene, S: Stepping, gi: int, gj: int) -> float:
+    """Return the length below which gaps and depths of two graphics do not count.
+
+    It is to the smaller one's diameter what it would be to the length of the scene, so that a
+    small body in a large scene lies on as well as in a small one; but more than what the solver
+    may leave of velocities moves bodies by.
+    """
+    number = S.plan.number
+    size = 2.0 * min(scene.graphics.radius[gi], scene.graphics.radius[gj])
+    part = size / (number[OWN_TIME] * number[PUSH_SPEED])
+    return max(min(part, 1.0) * number[SLOP], 2.0 * number[LEFT])
+
+
+@jitable
 def put_place(scene: Scene, S: Stepping, pair: int, s: int, gi: int, gj: int) -> int:
     """Make row s of a pair a contact point, but for gap and arms; return which, -1 for no room."""
     P, point = S.points, scene.work.points[s]
@@ -87,6 +105,7 @@ def put_place(scene: Scene, S: Stepping, pair: int, s: int, gi: int, gj: int) ->
     P.body[k, 0], P.body[k, 1] = scene.graphics.body[gi], scene.graphics.body[gj]
     same = scene.pairs.graphic_i[pair] * len(scene.graphics.body) + scene.pairs.graphic_j[pair]
     P.key[k], P.row[k] = same, s - scene.pairs.slot[pair]
+    P.slop[k] = slop_of(scene, S, gi, gj)
     n = vector(point[AT_NORMAL:])
     x = any_tangent(n)
     for j in range(3):

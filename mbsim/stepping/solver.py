@@ -313,8 +313,8 @@ def solve_points(
 
 
 @jitable
-def project_positions(p: Points, shift: F2, count: int, h: float, slop: float, most: float) -> int:
-    """Change displacements over h so that no point ends deeper than `slop`; return the sweeps.
+def project_positions(p: Points, shift: F2, count: int, h: float, most: float) -> int:
+    """Change displacements over h so that no point ends deeper than its slop; return the sweeps.
 
     The least change in the norm of the mass: gap + h H_n shift >= 0 without friction, pushes start
     at 0. Where nothing ends so deep nothing changes. What begins deeper than `most`, as a deck may
@@ -324,18 +324,18 @@ def project_positions(p: Points, shift: F2, count: int, h: float, slop: float, m
     for k in range(count):
         p.push[k] = 0.0
     sweeps, worst = 0, math.inf
-    while sweeps < MOST_SWEEPS and worst > slop:
+    while sweeps < MOST_SWEEPS and worst > 1.0:
         worst = 0.0
         for step in range(count):
             k = count - 1 - step if sweeps % 2 == 1 else step
             gap = max(p.gap[k], -most) + h * velocity_of(p, k, 0, shift)
-            if gap >= -0.5 * slop and p.push[k] == 0.0:
+            if gap >= -0.5 * p.slop[k] and p.push[k] == 0.0:
                 continue
             along = p.given[k, ALONG]
             wanted = p.push[k] - gap * along / h if along > 0.0 else 0.0
             change = max(wanted, 0.0) - p.push[k]
             p.push[k] += change
             apply(p, k, shift, (change, 0.0, 0.0))
-            worst = max(worst, abs(change) * p.given[k, W_NN] * h)
+            worst = max(worst, abs(change) * p.given[k, W_NN] * h / p.slop[k])
         sweeps += 1
     return sweeps

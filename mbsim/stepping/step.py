@@ -341,7 +341,7 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
     tally.count[NEWTONS] += newtons
     spread_parts(scene, S, count, h, slop)
     fill_shift(scene, S)
-    pushes = project_positions(P, M.shift, count, h, slop, h * S.plan.number[PUSH_SPEED])
+    pushes = project_positions(P, M.shift, count, h, h * S.plan.number[PUSH_SPEED])
     number = tally.number
     # of two halves that make one step the worse one counts
     number[RESIDUAL] = left * allowed if committed else max(left * allowed, number[RESIDUAL])

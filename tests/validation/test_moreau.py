@@ -256,17 +256,46 @@ def test_elastic_balls_that_meet_in_flight_keep_their_energy(
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.3])
-def test_rows_of_balls_that_meet_lose_energy_alone(tmp_path: Path, mu: float) -> None:
-    """Restitution of 1/2, with friction and without: from row to row energy never grows."""
+@pytest.mark.parametrize("tol", [1e-4, 1e-5, 1e-6])
+def test_rows_of_balls_that_meet_lose_energy_alone(tmp_path: Path, mu: float, tol: float) -> None:
+    """Restitution of 1/2, with friction and without: energy grows by less than steps may be off.
+
+    Where positions are projected balls are lifted.
+    """
     random = np.random.default_rng(4)
     places = 0.23 * np.stack(np.meshgrid(*[np.arange(2)] * 3, indexing="ij"), axis=-1).reshape(
         -1, 3
     )
     places = places + np.array([0.0, 0.0, 0.4]) + random.uniform(0.0, 1e-2, places.shape)
     model = decks.balls(tmp_path, places.tolist(), 0.5, mu, 0.8, dt=0.0017)
-    results = mbsim.simulate(model, integrator="MOREAU", tol=1e-5)
+    results = mbsim.simulate(model, integrator="MOREAU", tol=tol)
     energy = results["energy/kinetic"] + results["energy/potential"]
-    assert np.diff(energy).max() < 1e-6 * energy[0]
+    assert np.diff(energy).max() < 0.25 * tol * energy[0]
+
+
+@pytest.mark.parametrize("tol", [1e-2, 1e-3])
+@pytest.mark.parametrize("shape", ["sphere", "cube"])
+def test_small_bodies_of_a_large_scene_are_no_deeper_in_each_other(
+    tmp_path: Path, shape: str, tol: float
+) -> None:
+    """A heap of bodies of 2 cm beside a cube of half a metre, by steps of 2 ms."""
+    r = 0.02
+    random = np.random.default_rng(1)
+    cells = np.stack(np.meshgrid(*[np.arange(3)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    places = 2.2 * r * cells + random.uniform(0.0, 0.1 * r, cells.shape) + [0.0, 0.0, 2.0 * r]
+    ids = [100 * (2 + k) for k in range(len(places))]
+    parts = [decks.cube(40, 1.0, 0.5, (2.0, 0.0, 0.25))]
+    for k, place in enumerate(map(tuple, places.tolist())):
+        if shape == "sphere":
+            parts.append(text.sphere(2 + k, 0.1, r, place))
+        else:
+            parts.append(decks.cube(2 + k, 0.1, 2.0 * r / math.sqrt(3.0), place))
+    law = decks.rubbed(0.3)
+    parts += [text.contact(301, ids, ids, **law), text.contact(302, [*ids, 4000], [100], **law)]
+    model = decks.model(tmp_path, [*parts, text.gravity()], 0.5, 2e-3)
+    results = mbsim.simulate(model, integrator="MOREAU", tol=tol)
+    deepest = max(float(results[f"contacts/{c}/peak_penetration"]) for c in (301, 302))
+    assert deepest < tol * r
 
 
 @pytest.mark.parametrize("h", [0.5, 0.45, 0.4, 0.37, 0.35])
@@ -360,9 +389,9 @@ def test_a_ball_jams_in_a_wedge_that_is_steeper_than_its_friction(half: float, p
     """No impulses within the cones let it rebound: tan half < mu. Compliant contacts jam too."""
     touches = 0.05 / math.sin(half)
     text = WEDGE.format(a=0.5 * math.pi - half, z=1.0 * touches + 0.1, mu=part * math.tan(half))
-    results = mbsim.simulate(text, integrator="MOREAU")
+    results = mbsim.simulate(text, integrator="MOREAU", tol=1e-6)
     assert results.audit.warnings == ()
-    assert results["bodies/2/position"][-1] == pytest.approx([0.0, 0.0, touches], abs=1e-4)
+    assert results["bodies/2/position"][-1] == pytest.approx([0.0, 0.0, touches], abs=1e-5)
     assert np.abs(results["bodies/2/velocity"][-1]).max() < 1e-6
     loose = text.replace(f'mu_static="{part * math.tan(half)}"', 'mu_static="0.001"')
     loose = loose.replace(f'mu_dynamic="{part * math.tan(half)}"', 'mu_dynamic="0.001"')

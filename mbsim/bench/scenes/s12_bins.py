@@ -75,7 +75,7 @@ def _scene(count: int) -> Scene:
         pass_below=PASS,
         variations=({}, *({"h": h} for h in STEPS)),
         integrators=("MOREAU", "VERLET"),
-        tolerances=(1e-2, 2.5e-3, 1e-3),
+        tolerances=(2e-2, 1e-2, 2.5e-3, 1e-3),
         sample=p.BIN.sample,
         repeats=1,
         limit=60.0,
