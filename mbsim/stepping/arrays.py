@@ -165,6 +165,10 @@ class Points(NamedTuple):
     many: I1  # (m,) its rows there
     moved: I1  # (wide rows,) bodies that r moves
     moves: F3  # (wide rows, 6, 3) their velocities by r
+    touches: I1  # (nb,) points of a body that joints or forces hold, see `held`
+    answer: I1  # (nb,) first row of `answers` for wrenches on it, -1 for none
+    answered: I1  # (1,) rows of `answers` in use
+    answers: F3  # (wide rows, 6, 6) velocities of the bodies of its group by a wrench's components
     mu: F1  # (m,)
     holds: F1  # (m,) mu as it is at the step's begin
     slides: F1  # (m,) s of `one_point.slip_of` as found last, 0 for none
@@ -338,6 +342,10 @@ def make(
         many=whole(m),
         moved=whole(wide),
         moves=numbers(wide, 6, 3),
+        touches=whole(nb),
+        answer=whole(nb),
+        answered=whole(1),
+        answers=numbers(wide, 6, 6),
         mu=numbers(m),
         holds=numbers(m),
         slides=numbers(m),

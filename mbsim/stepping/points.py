@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.hooks import Hook, Joints, note_failure
 from mbsim.arrays.scene import Scene
-from mbsim.core.address import call_int
 from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import any_tangent, cross, dot, norm, vector
@@ -32,8 +30,8 @@ from mbsim.stepping.arrays import (
     W_ZZ,
     Stepping,
 )
-from mbsim.stepping.implicit import is_implicit, yield_to_forces
-from mbsim.stepping.one_point import alone, answer_of, direction, fill_inverse, velocity_of
+from mbsim.stepping.held import widen
+from mbsim.stepping.one_point import answer_of, fill_inverse, velocity_of
 
 #: Part of a step's motion by which pairs are looked for beyond it: others may hit what moves.
 AHEAD = 0.5
@@ -191,76 +189,6 @@ def put_side(
         dot(x, by_z),
         light + dot(z, by_z),
     )
-
-
-@jitable
-def add_moved(S: Stepping, k: int, b: int) -> bool:
-    """Let body b be one that point k moves; False if there is no room."""
-    P = S.points
-    row = P.wide[k] + P.many[k]
-    if row >= len(P.moved):
-        return False
-    P.moved[row] = b
-    P.many[k] += 1
-    return True
-
-
-@jitable
-def list_moved(S: Stepping, k: int) -> bool:
-    """Fill which bodies point k moves, behind those of the points before; False if no room."""
-    P, plan = S.points, S.plan
-    P.many[k] = 0
-    i, j = P.body[k, 0], P.body[k, 1]
-    for side in range(2):
-        b = i if side == 0 else j
-        g = plan.group[b]
-        if g < 0:
-            if b < len(S.motion.inverse) and not add_moved(S, k, b):
-                return False
-            continue
-        if side == 1 and g == plan.group[i]:
-            continue
-        for m in range(plan.first[g], plan.first[g + 1]):
-            if not add_moved(S, k, plan.members[m]):
-                return False
-    return True
-
-
-@jitable
-def widen(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
-    """Fill what impulses at point k do where joints or forces hold its bodies: rows from `begin`.
-
-    Return False if there is no room.
-    """
-    P, plan, impulse = S.points, S.plan, S.motion.impulse
-    P.wide[k] = -1
-    if plan.group[P.body[k, 0]] < 0 and plan.group[P.body[k, 1]] < 0:
-        return True
-    P.wide[k] = begin
-    if not list_moved(S, k):
-        return False
-    for a in range(3):
-        for b in range(6 * len(S.motion.inverse)):
-            impulse[b] = 0.0
-        for side in range(2):
-            b = P.body[k, side]
-            if plan.group[b] >= 0:
-                answers_alone = scene.tree.of_body[b] < 0
-                for c in range(6):
-                    e = direction(P, k, side, a, c)
-                    impulse[6 * b + c] += alone(P, k, side, a, c) if answers_alone else e
-        joints = scene.world.hooks[Hook.JOINTS]
-        if joints != 0:
-            note_failure(scene, call_int(joints, (scene, Joints.IMPULSE, 0.0, impulse, impulse)))
-        if is_implicit(S):
-            note_failure(scene, yield_to_forces(scene, S, impulse))
-        for row in range(begin, begin + P.many[k]):
-            b = P.moved[row]
-            side = 0 if b == P.body[k, 0] else 1
-            for c in range(6):
-                held = plan.group[b] >= 0
-                P.moves[row, c, a] = impulse[6 * b + c] if held else alone(P, k, side, a, c)
-    return True
 
 
 @jitable

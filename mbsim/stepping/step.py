@@ -71,6 +71,7 @@ from mbsim.stepping.friction import (
     let_yield,
     noise_of,
 )
+from mbsim.stepping.held import begin_answers
 from mbsim.stepping.implicit import is_implicit, take_into_step
 from mbsim.stepping.kept import index_kept, recall
 from mbsim.stepping.near_pairs import FARTHER, list_anew
@@ -230,6 +231,7 @@ def prepare_points(scene: Scene, S: Stepping, h: float) -> int:
     """
     P, M = S.points, S.motion
     count, begin = S.tally.count[POINTS], 0
+    begin_answers(S)
     for k in range(count):
         if not fill_point(scene, S, k, begin):
             return Code.MANY_POINTS

@@ -1,0 +1,173 @@
+"""What impulses at contact points do to bodies that joints hold or implicit forces couple.
+
+An impulse moves all bodies of a group then. What it does to them takes a solution of the group's
+linear system, for each of its three components; or, where a body has many points, for each of the
+six components of a wrench on the body, of which the impulses of all its points are made.
+"""
+
+from __future__ import annotations
+
+from mbsim.arrays.hooks import Hook, Joints, note_failure
+from mbsim.arrays.scene import Scene
+from mbsim.core.address import call_int
+from mbsim.core.jitable import jitable
+from mbsim.stepping.arrays import POINTS, Stepping
+from mbsim.stepping.implicit import is_implicit, yield_to_forces
+from mbsim.stepping.one_point import alone, direction
+
+#: Points of a body from which on six solutions for the body are less than three for each point.
+MANY_POINTS = 3
+
+
+@jitable
+def begin_impulse(S: Stepping) -> None:
+    """Let `Motion.impulse` be none."""
+    for k in range(6 * len(S.motion.inverse)):
+        S.motion.impulse[k] = 0.0
+
+
+@jitable
+def turn_into_velocities(scene: Scene, S: Stepping) -> None:
+    """Replace `Motion.impulse` by what it changes of velocities.
+
+    Bodies that no joint holds have their velocities by themselves there already.
+    """
+    joints, impulse = scene.world.hooks[Hook.JOINTS], S.motion.impulse
+    if joints != 0:
+        note_failure(scene, call_int(joints, (scene, Joints.IMPULSE, 0.0, impulse, impulse)))
+    if is_implicit(S):
+        note_failure(scene, yield_to_forces(scene, S, impulse))
+
+
+@jitable
+def begin_answers(S: Stepping) -> None:
+    """Forget what is known of held bodies, and count how many of the points each of them has."""
+    P, plan = S.points, S.plan
+    P.answered[0] = 0
+    for row in range(plan.first[len(plan.first) - 1]):
+        P.answer[plan.members[row]] = -1
+        P.touches[plan.members[row]] = 0
+    for k in range(S.tally.count[POINTS]):
+        for side in range(2):
+            if plan.group[P.body[k, side]] >= 0:
+                P.touches[P.body[k, side]] += 1
+
+
+@jitable
+def answer_body(scene: Scene, S: Stepping, b: int) -> bool:
+    """Return whether what wrenches on held body b do is in `Points.answers`; fill it if it pays."""
+    P, plan, impulse = S.points, S.plan, S.motion.impulse
+    if P.answer[b] >= 0:
+        return True
+    g = plan.group[b]
+    begin, size = P.answered[0], plan.first[g + 1] - plan.first[g]
+    if P.touches[b] < MANY_POINTS or begin + size > len(P.answers):
+        return False
+    P.answer[b], P.answered[0] = begin, begin + size
+    for e in range(6):
+        begin_impulse(S)
+        if scene.tree.of_body[b] < 0:
+            for c in range(6):
+                impulse[6 * b + c] = S.motion.inverse[b, c, e]
+        else:
+            impulse[6 * b + e] = 1.0
+        turn_into_velocities(scene, S)
+        for row in range(size):
+            m = plan.members[plan.first[g] + row]
+            for c in range(6):
+                P.answers[begin + row, c, e] = impulse[6 * m + c]
+    return True
+
+
+@jitable
+def add_moved(S: Stepping, k: int, b: int) -> bool:
+    """Let body b be one that point k moves; False if there is no room."""
+    P = S.points
+    row = P.wide[k] + P.many[k]
+    if row >= len(P.moved):
+        return False
+    P.moved[row] = b
+    P.many[k] += 1
+    return True
+
+
+@jitable
+def list_moved(S: Stepping, k: int) -> bool:
+    """Fill which bodies point k moves, behind those of the points before; False if no room."""
+    P, plan = S.points, S.plan
+    P.many[k] = 0
+    i, j = P.body[k, 0], P.body[k, 1]
+    for side in range(2):
+        b = i if side == 0 else j
+        g = plan.group[b]
+        if g < 0:
+            if b < len(S.motion.inverse) and not add_moved(S, k, b):
+                return False
+            continue
+        if side == 1 and g == plan.group[i]:
+            continue
+        for m in range(plan.first[g], plan.first[g + 1]):
+            if not add_moved(S, k, plan.members[m]):
+                return False
+    return True
+
+
+@jitable
+def add_answer(S: Stepping, k: int, side: int, a: int) -> None:
+    """Add what r_a of point k does by its wrench on a held body whose answer is known."""
+    P, plan, b = S.points, S.plan, S.points.body[k, side]
+    g = plan.group[b]
+    # the group of I comes first, then that of J if it is another one, or J alone
+    before = P.wide[k]
+    if side == 1 and g != plan.group[P.body[k, 0]]:
+        i = plan.group[P.body[k, 0]]
+        before += plan.first[i + 1] - plan.first[i] if i >= 0 else 0
+        before += 1 if i < 0 and P.body[k, 0] < len(S.motion.inverse) else 0
+    for e in range(6):
+        part = direction(P, k, side, a, e)
+        if part == 0.0:
+            continue
+        for row in range(plan.first[g + 1] - plan.first[g]):
+            for c in range(6):
+                P.moves[before + row, c, a] += part * P.answers[P.answer[b] + row, c, e]
+
+
+@jitable
+def widen(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
+    """Fill what impulses at point k do where joints or forces hold its bodies: rows from `begin`.
+
+    Return False if there is no room.
+    """
+    P, plan, impulse = S.points, S.plan, S.motion.impulse
+    P.wide[k] = -1
+    if plan.group[P.body[k, 0]] < 0 and plan.group[P.body[k, 1]] < 0:
+        return True
+    P.wide[k] = begin
+    if not list_moved(S, k):
+        return False
+    known = (
+        plan.group[P.body[k, 0]] >= 0 and answer_body(scene, S, P.body[k, 0]),
+        plan.group[P.body[k, 1]] >= 0 and answer_body(scene, S, P.body[k, 1]),
+    )
+    for a in range(3):
+        begin_impulse(S)
+        some = False
+        for side in range(2):
+            b = P.body[k, side]
+            if plan.group[b] >= 0 and not known[side]:
+                some, answers_alone = True, scene.tree.of_body[b] < 0
+                for c in range(6):
+                    e = direction(P, k, side, a, c)
+                    impulse[6 * b + c] += alone(P, k, side, a, c) if answers_alone else e
+        if some:
+            turn_into_velocities(scene, S)
+        for row in range(begin, begin + P.many[k]):
+            b = P.moved[row]
+            side = 0 if b == P.body[k, 0] else 1
+            for c in range(6):
+                held = plan.group[b] >= 0
+                P.moves[row, c, a] = impulse[6 * b + c] if held else alone(P, k, side, a, c)
+        for side in range(2):
+            if known[side]:
+                add_answer(S, k, side, a)
+    return True
