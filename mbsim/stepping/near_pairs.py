@@ -279,7 +279,7 @@ def list_anew(scene: Scene, S: Stepping, y: F1) -> None:
 
 @jitable
 def let_slow_down(scene: Scene, S: Stepping) -> None:
-    """Forget how fast members were before the last step."""
+    """Forget how fast members were before the last step; planes that turn are as fast as ever."""
     own, reach = scene.broadphase.own, S.motion.reach
     for k in range(graphics_awake(scene)):
         g = graphic_awake(scene, k)

@@ -94,29 +94,34 @@ MOST_ATTEMPTS = 4
 
 
 @jitable
+def reach_of(scene: Scene, S: Stepping, g: int, h: float) -> float:
+    """Return how far a graphic may come in a step; a plane at the distance of a usual member."""
+    reach = S.motion.reach[g]
+    if math.isinf(reach):
+        # a plane that turns, see `plane_travel`
+        reach = way_at(scene, S, g, h, scene.broadphase.lever[g])
+    return reach
+
+
+@jitable
 def make_room(scene: Scene, S: Stepping, y: F1, h: float) -> None:
     """List near pairs farther than a step can come, where shapes got fast."""
     broadphase = scene.broadphase
     if len(broadphase.contact) == 0:
         return
     fill_reach(scene, S, h)
-    wanted, short = 0.0, False
+    short = False
     for k in range(graphics_awake(scene)):
         g = graphic_awake(scene, k)
         if not math.isinf(broadphase.room[g]):
-            reach = S.motion.reach[g]
-            if math.isinf(reach):
-                # a plane that turns: at the distance of a usual member, see `plane_travel`
-                reach = way_at(scene, S, g, h, broadphase.lever[g])
-                wanted = max(wanted, reach)
-            short = short or reach > broadphase.room[g]
+            short = short or reach_of(scene, S, g, h) > broadphase.room[g]
     if short:
-        broadphase.size[0] = max(broadphase.size[0], 2.0 * FARTHER * wanted)
         for k in range(graphics_awake(scene)):
             g = graphic_awake(scene, k)
-            if not math.isinf(broadphase.room[g]) and not math.isinf(S.motion.reach[g]):
+            if not math.isinf(broadphase.room[g]):
                 # what a try found out holds until the step is taken
-                broadphase.own[g] = max(FARTHER * S.motion.reach[g], broadphase.own[g])
+                farther = FARTHER * reach_of(scene, S, g, h)
+                broadphase.own[g] = max(farther, broadphase.own[g])
         place_graphics(scene, y)
         list_anew(scene, S, y)
 
@@ -124,16 +129,15 @@ def make_room(scene: Scene, S: Stepping, y: F1, h: float) -> None:
 @jitable
 def want_room(scene: Scene) -> None:
     """Have near pairs listed anew before the next try of a step, as far as shapes went in this."""
-    broadphase, farthest = scene.broadphase, 0.0
+    broadphase = scene.broadphase
     for k in range(graphics_awake(scene)):
         g = graphic_awake(scene, k)
         if not math.isinf(broadphase.room[g]):
             broadphase.room[g] = 0.0
-            if math.isinf(scene.work.travel[g]):
-                farthest = max(farthest, plane_travel(scene, g))
-            else:
-                broadphase.own[g] = max(FARTHER * scene.work.travel[g], broadphase.own[g])
-    broadphase.size[0] = max(broadphase.size[0], 2.0 * FARTHER * farthest)
+            travel = scene.work.travel[g]
+            if math.isinf(travel):
+                travel = plane_travel(scene, g)
+            broadphase.own[g] = max(FARTHER * travel, broadphase.own[g])
 
 
 @jitable

@@ -58,6 +58,12 @@ def place_graphic(scene: Scene, y: F1, g: int) -> None:
 
 
 @jitable
+def half_skin(scene: Scene, g: int, skin: float) -> float:
+    """Return how far graphic g may go by itself: half of the skin, farther where it is fast."""
+    return max(0.5 * skin, scene.broadphase.own[g])
+
+
+@jitable
 def plane_travel(scene: Scene, g: int) -> float:
     """Return how far plane g has come towards a point since near pairs were listed.
 
@@ -81,7 +87,7 @@ def place_graphics(scene: Scene, y: F1) -> bool:
     the list of near pairs still holds.
     """
     graphics, work, state = scene.graphics, scene.work, scene.state
-    listed = True
+    listed, skin = True, scene.broadphase.size[0]
     for k in range(graphics_awake(scene)):
         g = graphic_awake(scene, k)
         b = graphics.body[g]
@@ -105,5 +111,5 @@ def place_graphics(scene: Scene, y: F1) -> bool:
         if travel < math.inf:
             listed = listed and travel <= room
         elif room < math.inf:
-            listed = listed and plane_travel(scene, g) <= 0.5 * scene.broadphase.size[0]
+            listed = listed and plane_travel(scene, g) <= half_skin(scene, g, skin)
     return listed

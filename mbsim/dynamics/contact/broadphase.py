@@ -37,7 +37,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import norm, sub, vector
 from mbsim.dynamics.bodies.awake import graphic_awake, graphics_awake
-from mbsim.dynamics.bodies.kinematics import plane_travel
+from mbsim.dynamics.bodies.kinematics import half_skin, plane_travel
 from mbsim.dynamics.contact.detection import measure_pair
 from mbsim.dynamics.contact.memory import put_aside
 
@@ -47,12 +47,6 @@ GIANT = 4.0
 MOST_HALVINGS = 20
 #: Each time what a fast member may go by itself becomes this part of it.
 LESS = 0.8
-
-
-@jitable
-def half_skin(scene: Scene, g: int, skin: float) -> float:
-    """Return how far graphic g may go by itself: half of the skin, farther where it is fast."""
-    return max(0.5 * skin, scene.broadphase.own[g])
 
 
 @jitable
@@ -105,12 +99,13 @@ def near(scene: Scene, i: int, j: int, skin: float) -> bool:
     radius, ground = scene.graphics.radius, len(scene.bodies.mass)
     for plane, other in ((i, j), (j, i)):
         if math.isinf(radius[plane]):
-            room = 0.5 * skin + half_skin(scene, other, skin)
+            comes = half_skin(scene, plane, skin)
+            room = comes + half_skin(scene, other, skin)
             if scene.graphics.body[plane] != ground:
-                # half of the skin is the other's, half the plane's: more farther away
+                # a plane that turns comes by more farther away
                 x, p = vector(scene.work.frames[other]), vector(scene.work.frames[plane])
                 farther = (norm(sub(x, p)) + room) / scene.broadphase.lever[plane]
-                room += 0.5 * skin * (max(1.0, farther) - 1.0)
+                room += comes * (max(1.0, farther) - 1.0)
             return not above_plane(scene, plane, other, room)
     return boxes_meet(scene, i, j) and balls_meet(scene, i, j, skin)
 
