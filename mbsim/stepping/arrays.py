@@ -277,6 +277,53 @@ def at_rest(nb: int, nc: int, pairs: int, groups: int, side: I2) -> Rest:
     )
 
 
+def no_points(m: int, nb: int, wide: int) -> Points:
+    """Return empty arrays for m contact points of nb bodies, with so many wide rows."""
+
+    def whole(*shape: int) -> np.ndarray:
+        return np.zeros(shape, dtype=np.int64)
+
+    def numbers(*shape: int) -> np.ndarray:
+        return np.zeros(shape)
+
+    return Points(
+        slot=whole(m),
+        contact=whole(m),
+        body=whole(m, 2),
+        key=whole(m),
+        row=whole(m),
+        was=whole(m),
+        gap=numbers(m),
+        slop=numbers(m),
+        point=numbers(m, 3),
+        arm=numbers(m, 2, 3),
+        normal=numbers(m, 3),
+        tangent=numbers(m, 3),
+        given=numbers(m, GIVEN),
+        wide=whole(m),
+        many=whole(m),
+        moved=whole(wide),
+        moves=numbers(wide, 6, 3),
+        touches=whole(nb),
+        answer=whole(nb),
+        answered=whole(1),
+        answers=numbers(wide, 6, 6),
+        mu=numbers(m),
+        holds=numbers(m),
+        slides=numbers(m),
+        ahead=numbers(m),
+        part=numbers(m),
+        held=whole(m),
+        closing=numbers(m),
+        r=numbers(m, 3),
+        full=numbers(m, 3),
+        old=numbers(m, 3),
+        way=numbers(m, 3),
+        counts=numbers(m),
+        push=numbers(m),
+    )
+
+
 def implicit_forces(n: int, nz: int) -> Forces:
     """Return empty arrays for n numbers of y and the user's states: what is not known is stiff."""
     number = np.array([1.0, math.inf])
@@ -324,42 +371,7 @@ def make(
         middle=numbers(ny),
         half=numbers(2, ny),
     )
-    points = Points(
-        slot=whole(m),
-        contact=whole(m),
-        body=whole(m, 2),
-        key=whole(m),
-        row=whole(m),
-        was=whole(m),
-        gap=numbers(m),
-        slop=numbers(m),
-        point=numbers(m, 3),
-        arm=numbers(m, 2, 3),
-        normal=numbers(m, 3),
-        tangent=numbers(m, 3),
-        given=numbers(m, GIVEN),
-        wide=whole(m),
-        many=whole(m),
-        moved=whole(wide),
-        moves=numbers(wide, 6, 3),
-        touches=whole(nb),
-        answer=whole(nb),
-        answered=whole(1),
-        answers=numbers(wide, 6, 6),
-        mu=numbers(m),
-        holds=numbers(m),
-        slides=numbers(m),
-        ahead=numbers(m),
-        part=numbers(m),
-        held=whole(m),
-        closing=numbers(m),
-        r=numbers(m, 3),
-        full=numbers(m, 3),
-        old=numbers(m, 3),
-        way=numbers(m, 3),
-        counts=numbers(m),
-        push=numbers(m),
-    )
+    points = no_points(m, nb, wide)
     room = 1 << max(4, int(4 * m - 1).bit_length())
     table, spare = numbers(m, KEPT_COLUMNS), numbers(m, KEPT_COLUMNS)
     kept = Kept(whole(2), whole(m), table, whole(m), spare, whole(room))

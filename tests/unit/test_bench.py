@@ -332,7 +332,7 @@ def test_integrators_are_those_of_the_scene_unless_asked_for():
     assert runner.choose_integrators(["verlet"]) == ["VERLET"]
     texts = [setting.text for setting in own.settings(scenes["S7_1000"], [], [])]
     assert "VERLET tol=0.001 k=200000" in texts
-    assert {s.tol for s in own.settings(scenes["S7_1000"], [], [])} == {2e-2, 1e-2, 1e-3}
+    assert {s.tol for s in own.settings(scenes["S7_1000"], [], [])} == {1e-1, 2e-2, 1e-2, 1e-3}
 
 
 def grains(bodies, wall_s, setting="VERLET tol=0.001"):
