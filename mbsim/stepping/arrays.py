@@ -81,10 +81,10 @@ LOADS = 5
 # entries of `Tally.count`: contact points, points that press, sweeps so far, steps tried so far,
 # steps that were left unsolved, steps with positions projected, Newton iterations so far, points
 # so far, steps of the deck's length that were compared with two halves, bodies that steps went
-# through so far
+# through so far, solutions for what impulses do to held bodies so far
 POINTS, PRESSING, ALL_SWEEPS, ALL_STEPS, UNSOLVED, PROJECTED, NEWTONS, ALL_POINTS = range(8)
-COMPARED, ALL_BODIES = 8, 9
-TALLY_COUNTS = 10
+COMPARED, ALL_BODIES, ALL_ANSWERS = 8, 9, 10
+TALLY_COUNTS = 11
 
 
 # entries of `Plan.force`: addresses of what linearises, factors and solves, 0 where forces are

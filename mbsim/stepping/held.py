@@ -11,7 +11,7 @@ from mbsim.arrays.hooks import Hook, Joints, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
-from mbsim.stepping.arrays import POINTS, Stepping
+from mbsim.stepping.arrays import ALL_ANSWERS, POINTS, Stepping
 from mbsim.stepping.implicit import is_implicit, yield_to_forces
 from mbsim.stepping.one_point import alone, direction
 
@@ -33,6 +33,7 @@ def turn_into_velocities(scene: Scene, S: Stepping) -> None:
     Bodies that no joint holds have their velocities by themselves there already.
     """
     joints, impulse = scene.world.hooks[Hook.JOINTS], S.motion.impulse
+    S.tally.count[ALL_ANSWERS] += 1
     if joints != 0:
         note_failure(scene, call_int(joints, (scene, Joints.IMPULSE, 0.0, impulse, impulse)))
     if is_implicit(S):

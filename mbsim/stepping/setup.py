@@ -18,6 +18,7 @@ from mbsim.dynamics.linearization.stiffness import sides_of
 from mbsim.errors import ModelError
 from mbsim.geometry.catalog import NEARS, PAIRS, REGION_ROWS
 from mbsim.stepping.arrays import (
+    ALL_ANSWERS,
     ALL_BODIES,
     ALL_POINTS,
     ALL_STEPS,
@@ -122,6 +123,7 @@ class Made(NamedTuple):
             "contact_solves": int(count[ALL_STEPS]),
             "contact_sweeps": int(count[ALL_SWEEPS]),
             "contact_newtons": int(count[NEWTONS]),
+            "contact_answers": int(count[ALL_ANSWERS]),
             "contact_unsolved": int(count[UNSOLVED]),
             "contact_projections": int(count[PROJECTED]),
             "contact_points": int(count[ALL_POINTS]),

@@ -161,3 +161,44 @@ def test_a_walker_with_stiff_drives_keeps_to_its_way(tmp_path: Path, h: float) -
     exact = mbsim.simulate(path, integrator="MOREAU", tol=1e-5)
     away = np.linalg.norm(run["bodies/2/position"] - exact["bodies/2/position"], axis=1)
     assert away.max() < 5.0 * h
+
+
+def tray(folder: Path, balls: int) -> mbsim.Results:
+    """Return a tray of 5 kg on a bushing, with so many spheres in a row on it, after 0.2 s."""
+    ids = [100 * (3 + k) for k in range(balls)]
+    spheres = [
+        text.sphere(3 + k, 0.1, 0.02, (0.05 * k - 0.025 * (balls - 1), 0.0, 0.57))
+        for k in range(balls)
+    ]
+    shape = text.attributes(
+        id=200,
+        type="BoxDefinedFromCenter",
+        center_marker_id=20,
+        length_x=1.0,
+        length_y=0.2,
+        length_z=0.1,
+    )
+    parts = [
+        text.body(2, 5.0, [0.03, 0.4, 0.4], (0.0, 0.0, 0.5)) + f"\n<Post_Graphic {shape}/>",
+        text.marker(11, 1, (0.0, 0.0, 0.5)),
+        *spheres,
+        text.contact(301, ids, [200], **decks.rubbed(0.3)),
+        text.gravity(),
+        bushing(20, 11, 1e6, 1e4),
+    ]
+    return mbsim.simulate(decks.model(folder, parts, 0.2, 2e-3), integrator="MOREAU", tol=1e-6)
+
+
+def test_what_a_held_body_answers_is_found_once_for_all_its_points(tmp_path: Path) -> None:
+    """Spheres on a tray: six solutions in a step for two, as three each, and for twenty.
+
+    Each of twenty presses as its weight does, as one of two.
+    """
+    few, many = tray(tmp_path, 2), tray(tmp_path, 20)
+    assert few.stats["contact_answers"] == many.stats["contact_answers"] == 6 * 100
+    for results, count in ((few, 2), (many, 20)):
+        assert results.audit.warnings == ()
+        force = results["contacts/301/force"][-1, 2]
+        assert force == pytest.approx(0.1 * count * WEIGHT, rel=1e-3)
+        sunk = 0.5 - results["bodies/2/position"][-1, 2]
+        assert sunk == pytest.approx((5.0 + 0.1 * count) * WEIGHT / 1e6, rel=1e-2)
