@@ -132,7 +132,7 @@ SCENES = (
     _scene(d.DRUMS[300]),
     _scene(
         d.DRUMS[3000],
-        # a step of MOREAU takes a second here
+        # a step of MOREAU goes through all spheres for each wrench on the drum's bushing
         integrators=("VERLET",),
         variations=tuple({"k": k} for k in STIFFNESSES[:2]),
         limit=200.0,
