@@ -39,6 +39,8 @@ BEFORE, F_BEFORE, F_BEHIND = range(3)
 #: Number of `Variations.line`: how far from the ends of a stretch of a step both sides of a
 #: difference touch alike, over its length.
 APART = 1
+#: Of `Variations.times`: how much later it is where a parameter is larger and smaller, by how much.
+UP_TO, DOWN_TO, BY = range(3)
 #: Number of `Variations.enough`: what an iteration may leave, over the derivative.
 LEFT = 1
 #: Contacts that may begin or end within one step.
@@ -76,6 +78,7 @@ class Variations(NamedTuple):
     line: tags.Scratch[F1]
     # (P, ns + 1) by how much slots change their branch later, by the parameter; what else does last
     shift: tags.Scratch[F2]
+    times: tags.Scratch[F3]  # (P, ns + 1, 3) of the same: UP_TO, DOWN_TO [T], BY
     asks: tags.Scratch[I1]  # (ns + 1,) slots that ask for another branch, their number last
     reason: tags.Scratch[F1]  # (P,) why a derivative is lost at the end of the step, or 0
     seen: tags.Scratch[I1]  # (ns + 1,) in how many points of a step slots touched, of how many

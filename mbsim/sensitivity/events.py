@@ -34,6 +34,8 @@ from mbsim.laws.catalog import BRANCHES, UNDECIDED
 from mbsim.sensitivity.along import ANY_BRANCH, branch_of, crossing
 from mbsim.sensitivity.arrays import (
     BEFORE,
+    BY,
+    DOWN_TO,
     F_BEFORE,
     F_BEHIND,
     LOST_GRAZING,
@@ -42,6 +44,7 @@ from mbsim.sensitivity.arrays import (
     REMEMBERED,
     TWIN,
     UP,
+    UP_TO,
     Variations,
 )
 from mbsim.sensitivity.twin import half_step, is_asked, keep_change, keep_side, set_parameter
@@ -49,12 +52,12 @@ from mbsim.sensitivity.twin import half_step, is_asked, keep_change, keep_side, 
 #: Times of changes are looked for along a straight line as long as this part of the problem's own
 #: time; how far behind them what friction keeps is asked for, over that.
 SPAN, BEHIND = 1e-4, 1e-5
-#: A shift is known to this part of itself.
+#: A difference of times is good where the run is so near to their middle, over their distance.
 SURE = 0.01
 #: By how much, over that, what is kept may differ between the run and both sides.
 ALIKE = 0.03
-#: So often a shorter difference is tried for the time of a change.
-TRIES = 4
+#: So often a smaller difference is tried for the time of a change; so often farther behind it.
+TRIES, TRIES_BEHIND = 4, 10
 #: A jump of f below this part of its size is none.
 NONE = 1e-9
 #: Rows of `Variations.work`: a point, f there, f with one change less.
@@ -83,16 +86,33 @@ def list_asking(V: Variations, scene: Scene, switched: bool) -> None:
 
 
 @jitable
-def shift_of(V: Variations, scene: Scene, t: float, H: float, k: int, what: int) -> float:
-    """Return how fast the time t, at which something changes, moves with parameter k, else NaN."""
-    e = half_step(V, k)
+def find_times(V: Variations, scene: Scene, t: float, H: float, k: int, what: int, at: int) -> None:
+    """Find when either side has the change that the run has at t; NaN where one has not.
+
+    With a smaller difference where the run is not in their middle: there times are no straight line
+    over the parameter. The one is kept that is the nearest to it, as rounding grows the other way.
+    """
+    e, best, found = half_step(V, k), math.inf, V.times[k, at]
+    found[:] = math.nan
     for _ in range(TRIES):
         up = crossing(V, scene, t - H, H, k, e, what, 1.0)
         down = crossing(V, scene, t - H, H, k, -e, what, 1.0)
         if abs(up - down) < math.inf:
-            return 0.5 / e * (up - down) * H
+            bow = abs(up + down - 2.0) / max(abs(up - down), 1e-300)
+            if bow < best:
+                best, found[UP_TO], found[DOWN_TO], found[BY] = bow, up * H - H, down * H - H, e
+            if bow <= SURE:
+                return
+            if bow > best:
+                return
         e *= 0.1
-    return math.nan
+
+
+@jitable
+def shift_of(V: Variations, k: int, at: int) -> float:
+    """Return how fast the time of a change moves with parameter k, NaN where that is unknown."""
+    found = V.times[k, at]
+    return 0.5 / found[BY] * (found[UP_TO] - found[DOWN_TO])
 
 
 @jitable
@@ -103,9 +123,11 @@ def note_shifts(V: Variations, scene: Scene, t: float, H: float, k: int) -> None
         twin.state.chattering[j] = scene.state.chattering[j]
     for j in range(V.asks[last]):
         s = V.asks[j]
-        V.shift[k, s] = shift_of(V, scene, t, H, k, branch_of(s))
+        find_times(V, scene, t, H, k, branch_of(s), s)
+        V.shift[k, s] = shift_of(V, k, s)
     if V.asks[last] == 0:
-        V.shift[k, last] = shift_of(V, scene, t, H, k, ANY_BRANCH)
+        find_times(V, scene, t, H, k, ANY_BRANCH, last)
+        V.shift[k, last] = shift_of(V, k, last)
 
 
 @jitable
@@ -170,20 +192,27 @@ def keep_one_side(V: Variations, scene: Scene, t: float, k: int) -> bool:
 def note_changed(V: Variations, scene: Scene, t: float, H: float, k: int) -> None:
     """Find how what friction keeps behind its change of branch moves with parameter k.
 
-    A little behind it, each side and each point at its own time.
+    A little behind it, each side and each point at its own time; farther where there one side is
+    not on the run's branch: next to the change rounding of rates decides.
     """
-    margin, whole, twin = BEHIND * H, half_step(V, k), view(V.words[TWIN], Scene)
+    twin = view(V.words[TWIN], Scene)
     for a in range(V.asks[len(V.asks) - 1]):
-        s = V.asks[a]
+        s, late = V.asks[a], BEHIND * H
         if not abs(V.shift[k, s]) < math.inf:
             continue
-        # so that what the shift is off by is less than how far behind it is
-        e = min(whole, margin / (SURE * abs(V.shift[k, s]) + 1e-300))
-        for side in range(2):
-            x = e if side == 0 else -e
-            if ask_beside(V, scene, t, k, x, margin + x * V.shift[k, s]) != 0:
-                V.shift[k, s] = math.nan
-            keep_side(V, twin, scene, side)
+        e = V.times[k, s, BY]
+        for _ in range(TRIES_BEHIND):
+            changed = 0
+            for side in range(2):
+                x = e if side == 0 else -e
+                if ask_beside(V, scene, t, k, x, late + V.times[k, s, UP_TO + side]) != 0:
+                    V.shift[k, s] = math.nan
+                keep_side(V, twin, scene, side)
+                if twin.work.slot[s, ASKED_BRANCH] == scene.work.slot[s, ASKED_BRANCH]:
+                    changed += 1
+            if changed == 2:
+                break
+            late *= 3.0
         for j in range(V.far.shape[2]):
             V.end[k, s, j] = 0.5 / e * (V.far[0, s, j] - V.far[1, s, j])
             V.middle[k, s, j] = 0.5 * (V.far[0, s, j] + V.far[1, s, j])

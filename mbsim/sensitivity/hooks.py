@@ -90,10 +90,15 @@ AT_FIRST = 200
 
 @jitable
 def lose(V: Variations, k: int, t: float, why: int) -> None:
-    """Know derivative k no more from time t on."""
+    """Know derivative k no more from time t on: nothing of it is carried along."""
     if V.lost[k] == math.inf:
         V.lost[k] = t
         V.why[k] = why
+    for table in (V.d, V.next, V.kept):
+        table[k, :] = 0.0
+    for tables in (V.memory, V.before, V.end, V.dense):
+        tables[k, :, :] = 0.0
+    V.bends[k] = 0
 
 
 @jitable
@@ -262,6 +267,8 @@ def note_changes(V: Variations, scene: Scene, t: float) -> None:
             note_shifts(V, scene, t, V.line[0], k)
             if V.words[REMEMBERED] > 0:
                 note_changed(V, scene, t, V.line[0], k)
+        else:
+            V.shift[k, :] = 0.0
     V.words[STRAIGHT] = 0
 
 

@@ -163,6 +163,7 @@ class Sensitivities:
             odd=np.zeros((2, shape[0]), dtype=np.int64),
             line=np.zeros(2),
             shift=np.zeros((count, shape[0] + 1)),
+            times=np.zeros((count, shape[0] + 1, 3)),
             asks=np.zeros(shape[0] + 1, dtype=np.int64),
             reason=np.zeros(count),
             seen=np.zeros(len(scene.state.touching) + 1, dtype=np.int64),

@@ -248,6 +248,27 @@ def test_parameters_of_one_law_are_as_each_alone(integrator):
             assert (found == alone).all()
 
 
+@pytest.mark.parametrize("integrator", ["DOPRI5", "DOP853"])
+def test_a_last_stop_with_little_force_left_is_known(integrator):
+    # of its time both sides of a difference are no straight line: it stops with 1/25 of the force
+    name, how = "Force_Contact[301].mu_dynamic", {"print_interval": 0.002}
+    deck, signal = MODELS / "sdnd100.xml", "bodies/2/position/x"
+    run = mbsim.simulate(deck, integrator=integrator, tol=1e-8, sensitivity=[name], **how)
+    assert run.parameters[name]["known_until"] == math.inf
+    truth = differences(deck, name, 0.1, 3e-6, [signal], integrator="DOP853", **how)[signal]
+    assert off(run.sensitivity(signal, name), truth) < 5e-5
+
+
+@pytest.mark.parametrize(("tol", "end"), [(1e-6, 8.0), (1e-7, 10.0)])
+def test_rounding_of_the_rates_of_normal_forces_ends_no_derivative(tol, end):
+    names = ["Force_Contact[301].mu_static", "Force_Contact[301].mu_dynamic"]
+    how = {"end_time": end, "integrator": "DOPRI5", "tol": tol, "print_interval": 0.4}
+    with run_model("belt_stick_slip.xml", sensitivity=names, **how) as run:
+        assert np.count_nonzero(run["events"]["kind"] == "stick") >= 4
+        for name in names:
+            assert run.parameters[name]["known_until"] == math.inf
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["DOP853", "RADAU5"])
 def test_a_belt_through_six_sticks_and_six_slips(integrator):
@@ -276,8 +297,11 @@ def test_what_is_not_known_any_more_is_nan_and_said():
     deck = SPRING.replace('fy_expression="0"', 'fy_expression="400*DY(20,10)"')
     deck = deck.replace('v_ic_x_flag="TRUE"', 'v_ic_x_flag="TRUE" v_ic_y="0" v_ic_y_flag="TRUE"')
     said, name = [], "Body_Rigid[2].v_ic_y"
-    how = {"integrator": "DOPRI5", "tol": 1e-8, "sensitivity": [name]}
-    run = mbsim.simulate(deck, notify=said.append, **how)
+    other, how = "Body_Rigid[2].mass", {"integrator": "DOPRI5", "tol": 1e-8}
+    run = mbsim.simulate(deck, notify=said.append, sensitivity=[name, other], **how)
+    alone = mbsim.simulate(deck, sensitivity=[other], **how)
+    signal = "bodies/2/position/x"
+    assert (run.sensitivity(signal, other) == alone.sensitivity(signal, other)).all()
     until = run.parameters[name]["known_until"]
     found = run.sensitivity("bodies/2/position/y", name)
     assert until < 5.0
