@@ -33,12 +33,16 @@ ALONG = 21
 WORTH, MOST = 22, 23
 # the parameter by which the twin was changed last
 SET = 24
-WORDS = 25
+# whether f is no function of time in the step that is taken, nor of what laws remember; -1: unknown
+STEADY = 25
+WORDS = 26
 #: Rows of `Variations.jump`: y before the commit, f before and behind it.
 BEFORE, F_BEFORE, F_BEHIND = range(3)
 #: Number of `Variations.line`: how far from the ends of a stretch of a step both sides of a
 #: difference touch alike, over its length.
 APART = 1
+#: Numbers of a row of `Variations.later`: at the begin of the last step, behind it.
+LAST_UNTIL, LAST_ON = range(2)
 #: Of `Variations.times`: how much later it is where a parameter is larger and smaller, by how much.
 UP_TO, DOWN_TO, BY = range(3)
 #: Number of `Variations.enough`: what an iteration may leave, over the derivative.
@@ -59,6 +63,7 @@ class Variations(NamedTuple):
     lost: F1  # (P,) time from which a derivative is not known, inf while it is
     why: I1  # (P,) for what reason: LOST_...
     dense: F3  # (P, coefficients, n) of the last step, as `Method.dense`
+    later: F2  # (P, 2) s of `later`: LAST_UNTIL, LAST_ON [T over the parameter's unit]
     next: tags.Scratch[F2]  # (P, n) derivative at the end of the step that is taken
     far: tags.Scratch[F3]  # (2, ns, most) what laws make of their memory on either side
     stage: tags.Scratch[F2]  # (STAGES, n) of an implicit method
@@ -82,6 +87,7 @@ class Variations(NamedTuple):
     asks: tags.Scratch[I1]  # (ns + 1,) slots that ask for another branch, their number last
     reason: tags.Scratch[F1]  # (P,) why a derivative is lost at the end of the step, or 0
     seen: tags.Scratch[I1]  # (ns + 1,) in how many points of a step slots touched, of how many
+    own: tags.Scratch[F1]  # (n,) a derivative, while D + s f is in its place
     kept: tags.Scratch[F2]  # (P, n) derivative at the begin of the last step
     change: tags.Scratch[F2]  # (MOST_CHANGES, 2) slots that begin or end to touch, at which part
     row: tags.Scratch[F2]  # (4, n) of a row of results: -, y beside it, its f, its derivative

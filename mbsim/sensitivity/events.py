@@ -31,7 +31,6 @@ from mbsim.dynamics.contact.forces import BRANCH as ASKED_BRANCH
 from mbsim.dynamics.contact.forces import FOUND_AT, contact_of
 from mbsim.integrators.scheme import in_workspace
 from mbsim.laws.catalog import BRANCHES, UNDECIDED
-from mbsim.sensitivity.along import ANY_BRANCH, branch_of, crossing
 from mbsim.sensitivity.arrays import (
     BEFORE,
     BY,
@@ -47,6 +46,7 @@ from mbsim.sensitivity.arrays import (
     UP_TO,
     Variations,
 )
+from mbsim.sensitivity.changes import ANY_BRANCH, branch_of, crossing
 from mbsim.sensitivity.twin import half_step, is_asked, keep_change, keep_side, set_parameter
 
 #: Times of changes are looked for along a straight line as long as this part of the problem's own

@@ -29,15 +29,7 @@ from mbsim.integrators.scheme import (
     Method,
     in_workspace,
 )
-from mbsim.sensitivity.along import (
-    is_bent,
-    is_too_much,
-    list_changes,
-    order_changes,
-    project_end,
-    remember_end,
-    step_along,
-)
+from mbsim.sensitivity.along import is_too_much, project_end, remember_end
 from mbsim.sensitivity.arrays import (
     ALONG,
     ASKED,
@@ -49,6 +41,8 @@ from mbsim.sensitivity.arrays import (
     F_BEFORE,
     FITTED,
     JOINTS,
+    LAST_ON,
+    LAST_UNTIL,
     LOST_FAILED,
     LOST_JUMP,
     LOST_LARGE,
@@ -61,12 +55,14 @@ from mbsim.sensitivity.arrays import (
     REMEMBERED,
     RHS,
     ROWS,
+    STEADY,
     STRAIGHT,
     TWIN,
     UP,
     WORTH,
     Variations,
 )
+from mbsim.sensitivity.changes import is_bent, list_changes, order_changes, step_along
 from mbsim.sensitivity.events import (
     SPAN,
     cross,
@@ -77,6 +73,7 @@ from mbsim.sensitivity.events import (
 )
 from mbsim.sensitivity.explicit import explicit_step, fit_beside
 from mbsim.sensitivity.implicit import implicit_step
+from mbsim.sensitivity.later import UNKNOWN, add, add_motion, give_up, go_on, is_steady, pays
 from mbsim.sensitivity.twin import half_step, keep_unit, reach_of, set_parameter
 
 #: Where the packed `Variations` stand: where those of MOREAU would, which takes no part in this.
@@ -99,6 +96,7 @@ def lose(V: Variations, k: int, t: float, why: int) -> None:
     for tables in (V.memory, V.before, V.end, V.dense):
         tables[k, :, :] = 0.0
     V.bends[k] = 0
+    V.later[k, :] = 0.0
 
 
 @jitable
@@ -132,44 +130,37 @@ def fit_hermite(V: Variations, m: Method, h: float) -> None:
 
 
 @jitable
-def carry(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
-    """Fill derivative k at the end of the step that is taken; return a code."""
-    for s in range(len(V.seen)):
-        V.seen[s] = 0
-    if V.words[CHANGES] > 0:
-        V.reach[k] = 0.0
-    e, code = half_step(V, k), 0
+def own_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
+    """Fill derivative k at the end of the step as the run's method has it; return a code."""
     if V.words[ALONG] == 1:
         V.error[k] = math.inf
-    elif V.words[ATTEMPT] == 0:
-        code = implicit_step(V, scene, m, t, h, k)
-        if code == Code.NOT_CONVERGED:
-            # with an old linearisation, where forces bend: not so along the motion
-            V.error[k], code = math.inf, 0
-    else:
-        code = explicit_step(V, scene, m, t, h, k)
-    if code != 0:
-        return code
-    changes = V.words[CHANGES] > 0 or is_bent(V, scene)
-    bends = changes or V.error[k] > V.enough[0]
-    V.reach[k] = 0.0 if changes or V.words[ALONG] == 1 else reach_of(V, e)
-    V.bends[k] = 1 if bends else 0
-    V.words[BENT] += V.bends[k]
-    if bends or (m.memory[SHOWN] == 1.0 and V.words[ATTEMPT] != 0):
-        # with the step of the differences that were taken: `reach` is the next one's
-        code = fit(V, scene, m, t, h, k, e)
-    if code != 0 or not bends:
-        return code
+        return 0
+    if V.words[ATTEMPT] != 0:
+        return explicit_step(V, scene, m, t, h, k)
+    code = implicit_step(V, scene, m, t, h, k)
+    if code == Code.NOT_CONVERGED:
+        # with an old linearisation, where forces bend: not so along the motion
+        V.error[k], code = math.inf, 0
+    return code
+
+
+@jitable
+def bent_step(
+    V: Variations, scene: Scene, m: Method, t: float, h: float, k: int, changes: bool
+) -> int:
+    """Fill derivative k, which is in `own`, at the end of a step in which forces bend."""
     if V.words[ALONG] == 0:
         V.smooth[k] = 0
     if V.words[ORDERED] == 0:
         V.words[ORDERED] = 1
+        if V.words[CHANGES] > 0:
+            is_steady(V, scene, m, t, h)
         if not order_changes(V, scene, t, h):
             return Code.NOT_CONVERGED
     for i in range(len(m.y)):
-        V.next[k, i] = V.d[k, i]
+        V.next[k, i] = V.own[i]
     e = half_step(V, k)
-    code = step_along(V, scene, m, t, h, k, 1.0, V.words[ALONG] == 1)
+    code = step_along(V, scene, t, h, k, 1.0, V.words[ALONG] == 1)
     if code == 0 and V.words[JOINTS] == 1:
         code = project_end(V, scene, m, t + h, k, e)
     if code == 0 and V.words[REMEMBERED] > 0:
@@ -179,10 +170,45 @@ def carry(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) ->
 
 
 @jitable
+def carry(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
+    """Fill derivative k at the end of the step that is taken; return a code.
+
+    In its place is D + s f meanwhile, where a touch begins later by s (`later`).
+    """
+    for s in range(len(V.seen)):
+        V.seen[s] = 0
+    if V.words[CHANGES] > 0:
+        V.reach[k] = 0.0
+    go_on(V, scene, m, t, h, k)
+    later, d = V.later[k, LAST_UNTIL], V.d[k]
+    for i in range(len(d)):
+        V.own[i] = d[i]
+    add(d, m.k[0], later)
+    e, code = half_step(V, k), own_step(V, scene, m, t, h, k)
+    add(V.next[k], V.jump[F_BEFORE], -later)
+    if code == 0:
+        changes = V.words[CHANGES] > 0 or is_bent(V, scene)
+        bends = changes or V.error[k] > V.enough[0]
+        V.reach[k] = 0.0 if changes or V.words[ALONG] == 1 else reach_of(V, e)
+        V.bends[k] = 1 if bends else 0
+        V.words[BENT] += V.bends[k]
+        if bends or later != 0.0 or (m.memory[SHOWN] == 1.0 and V.words[ATTEMPT] != 0):
+            # with the step of the differences that were taken: `reach` is the next one's
+            code = fit(V, scene, m, t, h, k, e)
+        if code == 0 and bends:
+            code = bent_step(V, scene, m, t, h, k, changes)
+    for i in range(len(d)):
+        d[i] = V.own[i]
+    return code
+
+
+@jitable
 def take_step(V: Variations, scene: Scene, m: Method, t: float, h: float) -> None:
     """Carry all derivatives over the step from t that is taken."""
     twin = view(V.words[TWIN], Scene)
     V.words[CHANGES] = V.words[ORDERED] = 0
+    V.words[STEADY] = UNKNOWN
+    touches = scene.work.hit[len(scene.work.hit) - 1] > 0
     V.words[MOST] = V.words[WORTH] * len(V.size) * (m.counts[EVALUATIONS] + AT_FIRST)
     listed = len(scene.contacts.id) == 0 or list_changes(V, scene, t, h)
     V.words[FITTED] = 1 if m.memory[SHOWN] == 1.0 or V.words[ATTEMPT] == 0 else 0
@@ -198,6 +224,8 @@ def take_step(V: Variations, scene: Scene, m: Method, t: float, h: float) -> Non
         elif V.words[REMEMBERED] > 0 and V.words[ODD] == 1:
             if not note_kept(V, scene, t + h, V.line[0], k):
                 lose(V, k, t + h, LOST_JUMP)
+        if not (touches and pays(V, V.jump[F_BEFORE], k)):
+            give_up(V, k)
         set_parameter(V, twin, scene, k, 0.0)
 
 
@@ -286,7 +314,9 @@ def derivative_at(V: Variations, scene: Scene, m: Method, k: int, t: float, out:
         twin.world.past[0] = WITHIN
         for i in range(n):
             V.next[k, i] = V.kept[k, i]
-        code = step_along(V, scene, m, m.memory[LAST_TIME], h, k, s, False)
+        later = V.later[k, LAST_ON]
+        code = step_along(V, scene, m.memory[LAST_TIME], h, k, s, False)
+        V.later[k, LAST_ON] = later
         twin.world.past[0] = NOW
         for i in range(n):
             out[i] = V.next[k, i]
@@ -298,6 +328,12 @@ def derivative_at(V: Variations, scene: Scene, m: Method, k: int, t: float, out:
         for j in range(last - 1, -1, -1):
             value = d[j, i] + (s if j % 2 == 0 else r) * value
         out[i] = value
+    if V.later[k, LAST_UNTIL] != 0.0:
+        for i in range(n):
+            V.next[k, i] = out[i]
+        code = add_motion(V, scene, m.memory[LAST_TIME], h, s, k, -V.later[k, LAST_UNTIL])
+        for i in range(n):
+            out[i] = V.next[k, i]
     return code
 
 

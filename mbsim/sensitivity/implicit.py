@@ -21,7 +21,7 @@ from mbsim.integrators.radau5 import G0, G_IM, G_RE, TI, C, T
 from mbsim.integrators.radau5 import E as ERROR
 from mbsim.integrators.radau5 import Z as STAGES_AT
 from mbsim.integrators.scheme import FRESH, LAST_STEP, Method, in_workspace
-from mbsim.sensitivity.arrays import JOINTS, LEFT, REMEMBERED, TWIN, UP, Variations
+from mbsim.sensitivity.arrays import JOINTS, LAST_UNTIL, LEFT, REMEMBERED, TWIN, UP, Variations
 from mbsim.sensitivity.twin import (
     half_step,
     keep_change,
@@ -37,6 +37,9 @@ Z, F, REAL, REAL_D, PAIR, PAIR_D, POINT, SLOPE = 0, 3, 6, 7, 8, 10, 12, 13
 STAGES = 14
 #: By how much the error of order 3 overrates that of the step.
 OVERRATED = 100.0
+#: What an iteration may leave is less by this while bodies collide: forces turn what is left of
+#: places into speeds.
+IN_IMPACT = 0.1
 #: The iteration fails after so many, and where a correction is more than SLOW of that before: the
 #: linearisation is that of other forces.
 MOST, SLOW = 12, 0.5
@@ -179,6 +182,7 @@ def implicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k:
     for i in range(len(m.y)):
         largest = max(largest, abs(m.y[i]) / V.scale[i])
     rate = V.rate[k] ** FORGET
+    left = V.enough[LEFT] * (IN_IMPACT if V.later[k, LAST_UNTIL] != 0.0 else 1.0)
     for iteration in range(MOST):
         code = evaluate_stages(V, scene, m, t, h, k, e)
         if code != 0:
@@ -194,7 +198,7 @@ def implicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k:
             return Code.NOT_CONVERGED
         if iteration > 0:
             rate = min(size / before, 0.99) if before > 0.0 else 0.0
-        if rate / (1.0 - rate) * size <= V.enough[LEFT] * whole:
+        if rate / (1.0 - rate) * size <= left * whole:
             break
         slow = size > SLOW * before
         if slow and size <= ROUNDING / e * largest:
@@ -205,6 +209,7 @@ def implicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k:
     V.rate[k] = max(rate, LEAST_RATE)
     code = estimate_error(V, scene, m, t, h, k, e)
     keep_polynomial(V, m, k)
+    V.smooth[k] = 1
     if code != 0:
         return code
     if V.words[REMEMBERED] > 0:
@@ -226,7 +231,7 @@ def estimate_error(
         r[i] = 0.0
         for j in range(3):
             r[i] += ERROR[j] * V.stage[Z + j, i] / h
-    if goes_on(m, h) and V.bends[k] == 0:
+    if goes_on(m, h) and V.smooth[k] == 1:
         # the last stage is the end of the step before
         for i in range(len(m.y)):
             r[i] += (V.dense[k, 1, i] - V.dense[k, 2, i] - V.dense[k, 3, i]) / m.memory[LAST_STEP]

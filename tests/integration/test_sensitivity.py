@@ -77,6 +77,10 @@ THROWN = """<Deck><Model>
 <Simulate analysis_type="Transient" end_time="0.2" print_interval="0.001"/>
 </Command></Deck>"""
 
+PUSH = """<Force_Vector_TwoBody id="401" type="ForceOnly" i_marker_id="20" j_floating_marker_id="10"
+ ref_marker_id="10" fx_expression="0" fy_expression="0" fz_expression="{force}"/>
+"""
+
 TWO_BOXES = """<Deck><Model><Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10"
  body_id="1"/><Post_Graphic id="100" type="Plane" rm_id="10"/>{}
 <Force_Gravity grav_z="-10"/></Model><Command>
@@ -157,6 +161,38 @@ def test_ten_impacts(integrator):
     assert np.count_nonzero(run["events"]["kind"] == "touch") == 10
     assert np.abs(found - sure)[flies].max() < 5e-4 * np.abs(sure)[flies].max()
     assert np.abs(found - sure)[flies & (run["time"] < 1.3)].max() < 1e-4 * 11.0
+
+
+@pytest.mark.parametrize(
+    ("integrator", "most"),
+    [("AUTO", 1e-4), ("DOPRI5", 1e-4), ("DOP853", 1e-4), ("RADAU5", 1e-4), ("GALPHA", 5e-4)],
+)
+def test_thirty_impacts_add_no_error_of_their_own(integrator, most):
+    names = {"Reference_Marker[20].pos_z": (0.6, 3e-7), "Force_Contact[301].damping": (200.0, 5e-5)}
+    how, signal = {"end_time": 4.5, "print_interval": 0.01}, "bodies/2/velocity/z"
+    deck = MODELS / "bouncing_sphere.xml"
+    run = mbsim.simulate(deck, integrator=integrator, tol=1e-8, sensitivity=list(names), **how)
+    flies = run["contacts/301/penetration"] == 0.0
+    assert np.count_nonzero(run["events"]["kind"] == "touch") >= 31
+    for name, (value, step) in names.items():
+        truth = differences(deck, name, value, step, [signal], integrator="DOP853", **how)[signal]
+        assert off(run.sensitivity(signal, name)[flies], truth[flies]) < most
+
+
+@pytest.mark.parametrize("integrator", ["DOPRI5", "DOP853", "RADAU5", "GALPHA"])
+@pytest.mark.parametrize("force", ["0", "2*SIN(900*TIME)"])
+def test_rows_within_impacts(integrator, force):
+    # where a force is a function of time no derivative is carried by how much later a touch is
+    name, how = "Reference_Marker[20].pos_z", {"end_time": 0.8, "print_interval": 4e-5}
+    deck, signal = (MODELS / "bouncing_sphere.xml").read_text(), "bodies/2/velocity/z"
+    deck = deck.replace("<Force_Gravity", PUSH.format(force=force) + "<Force_Gravity")
+    run = mbsim.simulate(deck, integrator=integrator, tol=1e-9, sensitivity=[name], **how)
+    touches = run["contacts/301/penetration"] > 0.0
+    assert np.count_nonzero(touches) > 30
+    truth = differences(deck, name, 0.6, 1e-7, [signal], integrator="DOP853", **how)[signal]
+    found = run.sensitivity(signal, name)
+    assert off(found, truth) < 3e-5
+    assert off(found[~touches], truth[~touches]) < 1e-4
 
 
 @pytest.mark.parametrize("integrator", ["AUTO", "DOPRI5", "DOP853", "RADAU5"])

@@ -1,0 +1,256 @@
+"""Where within a step contacts begin or end, and what derivatives do there.
+
+Where the force jumps by df as a contact begins or ends, the derivative does by -df dt*/dp (transfer
+condition; M. A. Aizerman, F. R. Gantmakher, Quart. J. Mech. Appl. Math. 11 (1958) 385).
+"""
+
+from __future__ import annotations
+
+import math
+
+from mbsim.arrays.scene import Scene
+from mbsim.core.address import call_int, view
+from mbsim.core.codes import Code
+from mbsim.core.jitable import jitable
+from mbsim.core.problem import ASK
+from mbsim.dynamics.contact.forces import BRANCH, FOUND_AT
+from mbsim.integrators.scheme import in_workspace
+from mbsim.laws.catalog import UNDECIDED
+from mbsim.sensitivity.along import (
+    FIRST,
+    POINT,
+    SECOND,
+    THIRD,
+    UPPER,
+    integrate,
+    point_at,
+)
+from mbsim.sensitivity.arrays import (
+    ALONG,
+    CHANGES,
+    LAST_ON,
+    LAST_UNTIL,
+    MOST_CHANGES,
+    REMEMBERED,
+    STEADY,
+    TWIN,
+    UP,
+    Variations,
+)
+from mbsim.sensitivity.later import add_motion, touch_later
+from mbsim.sensitivity.twin import half_step, set_parameter
+
+#: A change is looked for within so many lengths of a step of where the run has it.
+FARTHEST = 100.0
+#: Stands for a change of whatever branch where a slot is taken; those of single slots are below.
+ANY_BRANCH = -1
+#: A jump of f counts if what it does to y over the step is more than this part of the usual size.
+JUMPS = 1e-13
+
+
+@jitable
+def branch_of(s: int) -> int:
+    """Return what stands for the branch of slot s in place of a slot, and back."""
+    return ANY_BRANCH - 1 - s
+
+
+@jitable
+def touches(
+    V: Variations, scene: Scene, t: float, h: float, k: int, s: float, e: float, slot: int
+) -> int:
+    """Return 1 if a slot touches at the part s of the step, moved by e; 0 if not, less a code.
+
+    With a slot below 0: if a force is on another branch, ANY_BRANCH, or that of one slot.
+    """
+    twin, w = view(V.words[TWIN], Scene), V.work
+    p = in_workspace(V.words[UP])[0]
+    point_at(V, s, w[POINT])
+    if e != 0.0:
+        for i in range(V.next.shape[1]):
+            w[POINT, i] += e * V.next[k, i]
+    if slot < 0:
+        # rates of forces were those of another point
+        twin.work.slot[:, FOUND_AT] = math.nan
+        answer = call_int(p.switching, (p.context, t + s * h, ASK, w[POINT], w[UPPER]))
+        if slot == ANY_BRANCH or answer < 0:
+            return min(answer, 1)
+        asked = branch_of(slot)
+        if twin.work.touching[asked] == 0:
+            return 0
+        branch = twin.work.slot[asked, BRANCH]
+        return 1 if branch != UNDECIDED and branch != scene.state.mode[asked] else 0
+    code = call_int(p.rhs, (p.context, t + s * h, s * h, w[POINT], w[UPPER]))
+    return -code if code != 0 else twin.work.touching[slot]
+
+
+@jitable
+def crossing(
+    V: Variations, scene: Scene, t: float, h: float, k: int, e: float, slot: int, around: float
+) -> float:
+    """Return at which part of the step a slot begins or ends to touch; NaN where it does not.
+
+    Looked for in all of it, or no farther than `around` from where it does with e = 0.
+    """
+    set_parameter(V, view(V.words[TWIN], Scene), scene, k, e)
+    before = 1 - scene.work.touching[slot] if slot >= 0 else 0
+    low, high = 0.0, 1.0
+    if around > 0.0:
+        low, high = around, around
+        reach = 1e-9
+        while reach < FARTHEST:
+            low, high = around - reach, around + reach
+            if touches(V, scene, t, h, k, low, e, slot) == before:
+                if touches(V, scene, t, h, k, high, e, slot) == 1 - before:
+                    break
+            reach *= 8.0
+        if reach >= FARTHEST:
+            return math.nan
+    while True:
+        middle = 0.5 * (low + high)
+        if middle <= low or middle >= high or high - low < 1e-16:
+            return high
+        found = touches(V, scene, t, h, k, middle, e, slot)
+        if found < 0:
+            return math.nan
+        if found == before:
+            low = middle
+        else:
+            high = middle
+
+
+@jitable
+def list_changes(V: Variations, scene: Scene, t: float, h: float) -> bool:
+    """List the contacts that begin or end in the step in order of time; return whether all are."""
+    count, now, then = 0, scene.work.hit, scene.state.hit
+    for side in range(2):
+        hit = now if side == 0 else then
+        for j in range(hit[len(hit) - 1]):
+            s = hit[j]
+            if scene.work.touching[s] == scene.state.touching[s]:
+                continue
+            if count == MOST_CHANGES:
+                return False
+            V.change[count, 0] = float(s)
+            count += 1
+    V.words[CHANGES] = count
+    return True
+
+
+@jitable
+def order_changes(V: Variations, scene: Scene, t: float, h: float) -> bool:
+    """Find when each listed contact changes, and order them; return whether all were found."""
+    for j in range(V.words[CHANGES]):
+        when = crossing(V, scene, t, h, 0, 0.0, int(V.change[j, 0]), 0.0)
+        if not when >= 0.0:
+            return False
+        slot, place = V.change[j, 0], j
+        while place > 0 and V.change[place - 1, 1] > when:
+            V.change[place, 0], V.change[place, 1] = V.change[place - 1, 0], V.change[place - 1, 1]
+            place -= 1
+        V.change[place, 0], V.change[place, 1] = slot, when
+    return True
+
+
+@jitable
+def jump_at(V: Variations, scene: Scene, t: float, h: float, s: float) -> float:
+    """Leave by how much f falls at the part s in a row; return how much it moves in the step."""
+    twin, w, largest = view(V.words[TWIN], Scene), V.work, 0.0
+    p = in_workspace(V.words[UP])[0]
+    set_parameter(V, twin, scene, 0, 0.0)
+    near = max(1e-13, 4e-16 * abs(t) / h)
+    for side in range(2):
+        at = max(s - near, 0.0) if side == 0 else min(s + near, 1.0)
+        point_at(V, at, w[POINT])
+        call_int(p.rhs, (p.context, t + at * h, at * h, w[POINT], w[FIRST + side]))
+    for i in range(V.next.shape[1]):
+        w[THIRD, i] = w[FIRST, i] - w[SECOND, i]
+        largest = max(largest, abs(w[THIRD, i]) * h / V.scale[i])
+    return largest
+
+
+@jitable
+def transfer(V: Variations, scene: Scene, t: float, h: float, k: int, j: int, e: float) -> int:
+    """Let the derivative jump where listed contact j changes; return a code."""
+    slot, s, w = int(V.change[j, 0]), V.change[j, 1], V.work
+    if jump_at(V, scene, t, h, s) <= JUMPS:
+        return 0
+    up = crossing(V, scene, t, h, k, e, slot, s)
+    down = crossing(V, scene, t, h, k, -e, slot, s)
+    if not math.isfinite(up - down):
+        return Code.NOT_CONVERGED
+    # the rows were used meanwhile
+    jump_at(V, scene, t, h, s)
+    shift = 0.5 / e * (up - down) * h
+    for i in range(V.next.shape[1]):
+        V.next[k, i] += w[THIRD, i] * shift
+    return 0
+
+
+@jitable
+def is_bent(V: Variations, scene: Scene) -> bool:
+    """Return whether a slot touched in some of the points of a step, and not in all."""
+    last = len(V.seen) - 1
+    for s in range(last):
+        if 0 < V.seen[s] < V.seen[last]:
+            return True
+    return False
+
+
+@jitable
+def pass_change(
+    V: Variations, scene: Scene, t: float, h: float, k: int, j: int, later: float, e: float
+) -> tuple[int, float]:
+    """Carry the derivative in `next` across listed contact j; return a code, and how much later.
+
+    What is carried is D + s f, with the s that is given up to there and the one that is returned
+    from there on.
+    """
+    code, slot = transfer(V, scene, t, h, k, j, e), int(V.change[j, 0])
+    if code != 0 or V.words[STEADY] != 1 or scene.work.touching[slot] == 0:
+        return code, later
+    s = touch_later(V, scene, t, h, k, slot, V.change[j, 1], e)
+    if not abs(s) < math.inf:
+        return 0, later
+    return add_motion(V, scene, t, h, V.change[j, 1], k, s - later), s
+
+
+@jitable
+def step_along(
+    V: Variations,
+    scene: Scene,
+    t: float,
+    h: float,
+    k: int,
+    until: float,
+    goes_on: bool,
+) -> int:
+    """Carry the derivative in `next` over a part of the step, contact by contact; return a code.
+
+    Where it goes on from the step before `slope` is that step's last one, and the one of this step
+    is left there.
+    """
+    e, begin, later = half_step(V, k), 0.0, V.later[k, LAST_UNTIL]
+    begun = goes_on and V.words[ALONG] == 1 and V.smooth[k] == 1
+    code = add_motion(V, scene, t, h, 0.0, k, later)
+    if begun:
+        for i in range(V.next.shape[1]):
+            V.work[FIRST, i] = V.slope[k, i]
+    for j in range(V.words[CHANGES]):
+        end = V.change[j, 1]
+        if end > until:
+            break
+        code = code or integrate(V, scene, t, h, k, (begin, end), e, begun)
+        if code == 0:
+            code, later = pass_change(V, scene, t, h, k, j, later, e)
+        if code != 0:
+            return code
+        begin, begun = max(begin, end), False
+    code = code or integrate(V, scene, t, h, k, (begin, until), e, begun)
+    if goes_on:
+        # what friction keeps is another number behind the step
+        V.smooth[k] = 1 if begin < until and V.words[REMEMBERED] == 0 else 0
+        for i in range(V.next.shape[1]):
+            V.slope[k, i] = V.work[FIRST, i]
+    if until == 1.0:
+        V.later[k, LAST_ON] = later
+    return code or add_motion(V, scene, t, h, until, k, -later)
