@@ -21,7 +21,7 @@ _KEPT_BITS = 12
 _BYTES = 3.2
 #: What poses have already.
 _FROM_POSES = ("position", "quaternion")
-#: What is taken first; others follow, bodies last.
+#: What is taken first; others follow, bodies and derivatives last.
 _FIRST = ("energy", "requests", "contacts")
 
 
@@ -65,21 +65,18 @@ def _whole(scene: Scene, name: str) -> str:
 
 
 def _ordered(scene: Scene, asked: Sequence[str]) -> list[str]:
-    """Return the names of signals, what was asked for first, bodies last."""
+    """Return the names of signals, what was asked for first, then bodies and derivatives last."""
     signals = [
         name
         for name in scene.results.signals()
-        if name != "time"
-        # of a derivative the page could not find that of a magnitude
-        and not name.startswith(SENSITIVITY)
-        and not (name.startswith("bodies/") and name.endswith(_FROM_POSES))
+        if name != "time" and not (name.startswith("bodies/") and name.endswith(_FROM_POSES))
     ]
 
     def rank(name: str) -> int:
         group = name.partition("/")[0]
         if group in _FIRST:
             return _FIRST.index(group)
-        return len(_FIRST) + (group == "bodies")
+        return len(_FIRST) + (group == "bodies") + 2 * name.startswith(SENSITIVITY)
 
     # names that poses have are known as well
     wanted = [_whole(scene, each) for name in asked for each in scene.results.find(name)]
@@ -107,9 +104,13 @@ def channels(
             left_out += 1
             continue
         table = np.asarray(results[name], dtype=np.float64).reshape(n, width)
-        for part, column in _parts(name, width, n > MOST_VALUES):
+        slopes = name.startswith(SENSITIVITY)
+        for part, column in _parts(name, width, slopes or n > MOST_VALUES):
             quantity = quantity_of(results, name, min(column, width - 1))
-            chosen = np.linalg.norm(table, axis=1) if column == width else table[:, column]
+            if column < width:
+                chosen = table[:, column]
+            else:
+                chosen = results[f"{name}/mag"] if slopes else np.linalg.norm(table, axis=1)
             found = shortened(chosen * scene.units.factor_to(shown, quantity))
             kept = extreme_rows(found) if n > MOST_VALUES else None
             about.append(
@@ -133,13 +134,14 @@ def channels(
     return Channels(about, arrays, left_out)
 
 
-def _parts(name: str, width: int, thinned: bool) -> Iterator[tuple[str, int]]:
+def _parts(name: str, width: int, magnitudes: bool) -> Iterator[tuple[str, int]]:
     """Yield the parts of a signal and their columns, that of a magnitude behind the last.
 
-    The page finds magnitudes by itself where it has all rows: others are extremes of each part.
+    The page finds magnitudes by itself where it has all rows: others are extremes of each part. Nor
+    is the derivative of one the size of a derivative.
     """
     if width == 1:
         yield "", 0
         return
-    parts = [part for part in parts_of(width) if part != "mag" or thinned]
+    parts = [part for part in parts_of(width) if part != "mag" or magnitudes]
     yield from ((part, column) for column, part in enumerate(parts))

@@ -124,6 +124,35 @@ def test_magnitudes_of_a_long_run_are_packed(tmp_path):
     assert 2 <= names["bodies/2/velocity/mag"] <= MOST_VALUES
 
 
+def channel_values(about, arrays):
+    """Return the values of all channels by name."""
+    flat = arrays["channels"].reshape(4, -1).T.copy().view("<f4").reshape(-1)
+    ends = np.cumsum([channel["rows"] for channel in about["channels"]])
+    names = [channel["name"] for channel in about["channels"]]
+    return dict(zip(names, np.split(flat, ends[:-1]), strict=True))
+
+
+def test_derivatives_are_curves_with_their_own_magnitudes_and_units(tmp_path):
+    name, signal = "Body_Rigid[2].v_ic_x", "bodies/2/velocity"
+    with open_results(run_balls(tmp_path, sensitivity=[name])) as results:
+        pack = run_data(read_scene(results))
+        about, arrays = unpack(pack.data)
+        found, units = channel_values(about, arrays), {}
+        for channel in about["channels"]:
+            units[channel["name"]] = channel["unit"]
+        for part in ("x", "z", "mag"):
+            asked = f"sensitivity/{name}/{signal}/{part}"
+            assert found[asked] == pytest.approx(results[asked], rel=1e-3, abs=1e-6)
+            assert units[asked] == units[f"sensitivity/{name}/{signal}/x"]
+        wanted = [each for each in results.signals() if each.startswith(f"sensitivity/{name}/")]
+        assert f"sensitivity/{name}/bodies/2/position" in wanted
+        there = {each.removesuffix(f"/{each.rpartition('/')[2]}") for each in found} | set(found)
+        assert set(wanted) <= there
+        assert pack.signals_left_out == 0
+        first = unpack(packs_of([read_scene(results)], [f"sensitivity/{name}/energy/*"])[0].data)[0]
+        assert first["channels"][0]["name"].startswith(f"sensitivity/{name}/energy/")
+
+
 def test_a_body_that_goes_far_is_said_to_be_shown_coarsely(tmp_path):
     with open_results(falling(tmp_path / "run", end=1000, interval=10, speed=7e3)) as results:
         scene = read_scene(results)
