@@ -43,6 +43,8 @@ BEFORE, F_BEFORE, F_BEHIND = range(3)
 APART = 1
 #: Numbers of a row of `Variations.later`: at the begin of the last step, behind it.
 LAST_UNTIL, LAST_ON = range(2)
+#: Numbers of a row of `Variations.shown`: part of the last step, `later` there.
+SHOWN_AT, SHOWN_LATER = range(2)
 #: Of `Variations.times`: how much later it is where a parameter is larger and smaller, by how much.
 UP_TO, DOWN_TO, BY = range(3)
 #: Number of `Variations.enough`: what an iteration may leave, over the derivative.
@@ -88,7 +90,9 @@ class Variations(NamedTuple):
     reason: tags.Scratch[F1]  # (P,) why a derivative is lost at the end of the step, or 0
     seen: tags.Scratch[I1]  # (ns + 1,) in how many points of a step slots touched, of how many
     own: tags.Scratch[F1]  # (n,) a derivative, while D + s f is in its place
-    kept: tags.Scratch[F2]  # (P, n) derivative at the begin of the last step
+    # (P, n) derivative at the begin of the last step, or at its last row where that was along it
+    kept: tags.Scratch[F2]
+    shown: tags.Scratch[F2]  # (P, 2) where that is: SHOWN_AT, SHOWN_LATER
     change: tags.Scratch[F2]  # (MOST_CHANGES, 2) slots that begin or end to touch, at which part
     row: tags.Scratch[F2]  # (4, n) of a row of results: -, y beside it, its f, its derivative
     scale: tags.Constant[F1]  # (n,) usual size of a number of y

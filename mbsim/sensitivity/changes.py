@@ -28,8 +28,6 @@ from mbsim.sensitivity.along import (
 from mbsim.sensitivity.arrays import (
     ALONG,
     CHANGES,
-    LAST_ON,
-    LAST_UNTIL,
     MOST_CHANGES,
     REMEMBERED,
     STEADY,
@@ -221,17 +219,20 @@ def step_along(
     t: float,
     h: float,
     k: int,
-    until: float,
+    span: tuple[float, float],
     goes_on: bool,
-) -> int:
-    """Carry the derivative in `next` over a part of the step, contact by contact; return a code.
+    later: float,
+) -> tuple[int, float]:
+    """Carry the derivative in `next` over a part of the step, contact by contact.
 
+    Return a code, and how much later what is behind it happens, which `later` is at its begin.
     Where it goes on from the step before `slope` is that step's last one, and the one of this step
     is left there.
     """
-    e, begin, later = half_step(V, k), 0.0, V.later[k, LAST_UNTIL]
+    begin, until = span
+    e = half_step(V, k)
     begun = goes_on and V.words[ALONG] == 1 and V.smooth[k] == 1
-    code = add_motion(V, scene, t, h, 0.0, k, later)
+    code = add_motion(V, scene, t, h, begin, k, later)
     if begun:
         for i in range(V.next.shape[1]):
             V.work[FIRST, i] = V.slope[k, i]
@@ -239,11 +240,13 @@ def step_along(
         end = V.change[j, 1]
         if end > until:
             break
+        if end <= span[0] and span[0] > 0.0:
+            continue
         code = code or integrate(V, scene, t, h, k, (begin, end), e, begun)
         if code == 0:
             code, later = pass_change(V, scene, t, h, k, j, later, e)
         if code != 0:
-            return code
+            return code, later
         begin, begun = max(begin, end), False
     code = code or integrate(V, scene, t, h, k, (begin, until), e, begun)
     if goes_on:
@@ -251,6 +254,4 @@ def step_along(
         V.smooth[k] = 1 if begin < until and V.words[REMEMBERED] == 0 else 0
         for i in range(V.next.shape[1]):
             V.slope[k, i] = V.work[FIRST, i]
-    if until == 1.0:
-        V.later[k, LAST_ON] = later
-    return code or add_motion(V, scene, t, h, until, k, -later)
+    return code or add_motion(V, scene, t, h, until, k, -later), later

@@ -55,6 +55,8 @@ from mbsim.sensitivity.arrays import (
     REMEMBERED,
     RHS,
     ROWS,
+    SHOWN_AT,
+    SHOWN_LATER,
     STEADY,
     STRAIGHT,
     TWIN,
@@ -160,7 +162,8 @@ def bent_step(
     for i in range(len(m.y)):
         V.next[k, i] = V.own[i]
     e = half_step(V, k)
-    code = step_along(V, scene, t, h, k, 1.0, V.words[ALONG] == 1)
+    goes_on, later = V.words[ALONG] == 1, V.later[k, LAST_UNTIL]
+    code, V.later[k, LAST_ON] = step_along(V, scene, t, h, k, (0.0, 1.0), goes_on, later)
     if code == 0 and V.words[JOINTS] == 1:
         code = project_end(V, scene, m, t + h, k, e)
     if code == 0 and V.words[REMEMBERED] > 0:
@@ -278,6 +281,7 @@ def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int
         for s in range(V.memory.shape[1]):
             for j in range(V.memory.shape[2]):
                 V.before[k, s, j], V.memory[k, s, j] = V.memory[k, s, j], V.end[k, s, j]
+        V.shown[k, SHOWN_AT], V.shown[k, SHOWN_LATER] = 0.0, V.later[k, LAST_UNTIL]
         for i in range(n):
             V.kept[k, i] = V.d[k, i]
             V.d[k, i] = V.next[k, i]
@@ -312,14 +316,18 @@ def derivative_at(V: Variations, scene: Scene, m: Method, k: int, t: float, out:
     if V.bends[k] == 1:
         twin = view(V.words[TWIN], Scene)
         twin.world.past[0] = WITHIN
+        code, done = 0, V.shown[k]
         for i in range(n):
             V.next[k, i] = V.kept[k, i]
-        later = V.later[k, LAST_ON]
-        code = step_along(V, scene, m.memory[LAST_TIME], h, k, s, False)
-        V.later[k, LAST_ON] = later
+        if s > done[SHOWN_AT]:
+            # from the row before it in this step on, or a long step is gone over again for each
+            span, later = (done[SHOWN_AT], s), done[SHOWN_LATER]
+            begin = m.memory[LAST_TIME]
+            code, done[SHOWN_LATER] = step_along(V, scene, begin, h, k, span, False, later)
+            done[SHOWN_AT] = s
         twin.world.past[0] = NOW
         for i in range(n):
-            out[i] = V.next[k, i]
+            out[i] = V.kept[k, i] = V.next[k, i]
         return code
     d, r = V.dense[k], 1.0 - s
     last = len(d) - 1

@@ -170,6 +170,7 @@ class Sensitivities:
             seen=np.zeros(len(scene.state.touching) + 1, dtype=np.int64),
             own=np.zeros(n),
             kept=np.zeros((count, n)),
+            shown=np.zeros((count, 2)),
             change=np.zeros((at.MOST_CHANGES, 2)),
             row=np.zeros((4, n)),
             scale=_scale(self.system, n),
