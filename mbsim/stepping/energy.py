@@ -8,6 +8,14 @@ to rounding. The potential of forces goes by where bodies are put, which is not 
 an impact that a step takes at its end, nor where positions are projected; and kinetic energy is
 that of the inertia as bodies are turned. What is left open by both is known, and no more than that
 may be: whatever else opens the balance is a fault, or a step too long for its forces.
+
+Of bodies that nothing but impacts presses on contacts take that too: their displacements are those
+of flight. With c, d and M as in `displacements`, u = H v,
+
+    r . (u + u')/2 + (c - 1/2) r . H d
+
+is what impulses do to a body that flies before an impact and behind it. One that rests behind it is
+not moved on by d there: 1/2 (1 - c)^2 d . M d less.
 """
 
 from __future__ import annotations
@@ -18,7 +26,9 @@ from mbsim.core.jitable import jitable
 from mbsim.core.layout import AT_W, BODY_SIZE
 from mbsim.core.rotation import add, dot, rotate, scale, sub, unrotate, vector
 from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
-from mbsim.stepping.arrays import ASLEEP, LEFT_OPEN, Stepping
+from mbsim.stepping.arrays import ASLEEP, LEFT_OPEN, POINTS, Stepping
+from mbsim.stepping.displacements import FLIES, LANDS
+from mbsim.stepping.one_point import velocity_of
 
 
 @jitable
@@ -69,3 +79,78 @@ def keep_left(S: Stepping, left: float, committed: bool) -> None:
     """Keep what a step leaves open; its second half adds to what the first one did."""
     number = S.tally.number
     number[LEFT_OPEN] = left if committed else number[LEFT_OPEN] + left
+
+
+@jitable
+def note_grounded(scene: Scene, S: Stepping, i: int, j: int) -> None:
+    """Note that ground presses on the group of a body, where one of two bodies is ground."""
+    nb, group = len(scene.bodies.mass), scene.scales.group
+    if i == nb and j < nb:
+        S.tally.grounded[group[j]] = 1
+    elif j == nb and i < nb:
+        S.tally.grounded[group[i]] = 1
+
+
+@jitable
+def unmoved(scene: Scene, S: Stepping, b: int) -> float:
+    """Return what a body that rests behind an impact is not given by d there.
+
+    Bodies are turned as at the step's begin.
+    """
+    M = S.motion
+    d = sub(vector(M.free[b]), vector(M.before[b]))
+    turning = sub(vector(M.free[b], 3), vector(M.before[b], 3))
+    square = scene.bodies.mass[b] * dot(d, d) + turned_energy(scene, b, turning, turning)
+    return 0.5 * (1.0 - M.part[b]) ** 2 * square
+
+
+@jitable
+def unmoved_once(scene: Scene, S: Stepping, b: int) -> float:
+    """Return `unmoved` of a body and of all that joints hold to it, and 0 when asked again.
+
+    `Motion.changed` is -1 of what was asked for; the next step begins with 0.
+    """
+    M, plan, total = S.motion, S.plan, 0.0
+    if M.changed[b] == -1:
+        return 0.0
+    group = plan.group[b]
+    if group < 0:
+        M.changed[b] = -1
+        return unmoved(scene, S, b)
+    for row in range(plan.first[group], plan.first[group + 1]):
+        member = plan.members[row]
+        M.changed[member] = -1
+        total += unmoved(scene, S, member)
+    return total
+
+
+@jitable
+def add_losses(scene: Scene, S: Stepping, new: F1) -> None:
+    """Add what contacts took, before bodies are moved on."""
+    P, M, ground = S.points, S.motion, len(S.rest.body)
+    first = len(new) - len(scene.contacts.id)
+    for k in range(S.tally.count[POINTS]):
+        if P.r[k, 0] == 0.0:
+            continue
+        i, j = P.body[k, 0], P.body[k, 1]
+        c, lost, across = P.contact[k], 0.0, 0.0
+        note_grounded(scene, S, i, j)
+        # bodies that press on each other have one of both; what ground has is not of this point
+        b = i if i != ground else j
+        flies, later = M.flies[b], M.part[b] - 0.5
+        for a in range(3):
+            before = velocity_of(P, k, a, M.before)
+            work = 0.5 * P.r[k, a] * (before + velocity_of(P, k, a, M.v))
+            more = later * P.r[k, a] * (velocity_of(P, k, a, M.free) - before)
+            if flies == FLIES:
+                work += more
+            elif flies == LANDS:
+                lost -= more
+            lost -= work
+            across += work if a > 0 else 0.0
+        if flies == LANDS:
+            lost += unmoved_once(scene, S, i) if i != ground else 0.0
+            lost += unmoved_once(scene, S, j) if j != ground else 0.0
+        new[first + c] += lost
+        if scene.audit.friction_at[c] >= 0:
+            new[scene.audit.friction_at[c]] += across

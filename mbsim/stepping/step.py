@@ -58,7 +58,7 @@ from mbsim.stepping.displacements import (
     spread_parts,
     velocities_jump,
 )
-from mbsim.stepping.energy import keep_left, left_by_forces, left_by_spins
+from mbsim.stepping.energy import add_losses, keep_left, left_by_forces, left_by_spins
 from mbsim.stepping.forces import find_forces, find_motion
 from mbsim.stepping.free_motion import fill_motion
 from mbsim.stepping.friction import (
@@ -278,38 +278,6 @@ def start_impulses(scene: Scene, S: Stepping, h: float) -> None:
 
 
 @jitable
-def note_grounded(scene: Scene, S: Stepping, i: int, j: int) -> None:
-    """Note that ground presses on the group of a body, where one of two bodies is ground."""
-    nb, group = len(scene.bodies.mass), scene.scales.group
-    if i == nb and j < nb:
-        S.tally.grounded[group[j]] = 1
-    elif j == nb and i < nb:
-        S.tally.grounded[group[i]] = 1
-
-
-@jitable
-def add_losses(scene: Scene, S: Stepping, new: F1) -> None:
-    """Add what contacts took: an impulse does its work at the mean of velocities."""
-    P, M = S.points, S.motion
-    first = len(new) - len(scene.contacts.id)
-    for k in range(S.tally.count[POINTS]):
-        if P.r[k, 0] == 0.0:
-            continue
-        c, across = P.contact[k], 0.0
-        note_grounded(scene, S, P.body[k, 0], P.body[k, 1])
-        for a in range(3):
-            before = velocity_of(P, k, a, M.before)
-            u = before + velocity_of(P, k, a, M.v)
-            if P.part[k] != NO_IMPACT:
-                # velocities are those right before the impact and behind it
-                u += (2.0 * P.part[k] - 1.0) * (velocity_of(P, k, a, M.free) - before)
-            new[first + c] -= 0.5 * P.r[k, a] * u
-            across += 0.5 * P.r[k, a] * u if a > 0 else 0.0
-        if scene.audit.friction_at[c] >= 0:
-            new[scene.audit.friction_at[c]] += across
-
-
-@jitable
 def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
     """Find impulses and displacements of the points at hand; return 0 or a code."""
     P, M, tally = S.points, S.motion, S.tally
@@ -452,10 +420,11 @@ def take_step(
     for k in range(BODY_SIZE * len(scene.bodies.mass), len(y)):
         new[k] = y[k] + h * dy[k]
     left = left_by_forces(scene, S, h)
+    if S.tally.count[PRESSING] > 0:
+        add_losses(scene, S, new)
     move_bodies(scene, S, y, h, new)
     keep_left(S, left + left_by_spins(scene, S, new), committed)
     if S.tally.count[PRESSING] > 0:
-        add_losses(scene, S, new)
         # impulses may throw bodies farther than was looked for
         if not place_graphics(scene, new):
             code = Code.TOO_FAR
