@@ -50,11 +50,17 @@ def output_within(m: Method, times: F1, t: float) -> bool:
 
 @jitable
 def row_within(m: Method, times: F1, t: float, h: float) -> float:
-    """Return how far from t the first row within a step h is whose velocities jump, else 0."""
-    if m.memory[HITS] == 0.0 or m.counts[NEXT_OUTPUT] == len(times):
+    """Return how far from t the first row within a step h is whose velocities jump, else 0.
+
+    A row at its begin may not be there yet, for t is less than that by rounding.
+    """
+    if m.memory[HITS] == 0.0:
         return 0.0
-    away = times[m.counts[NEXT_OUTPUT]] - t
-    return away if AT_AN_END * h < away < (1.0 - AT_AN_END) * h else 0.0
+    for row in range(m.counts[NEXT_OUTPUT], len(times)):
+        away = times[row] - t
+        if away > AT_AN_END * h:
+            return away if away < (1.0 - AT_AN_END) * h else 0.0
+    return 0.0
 
 
 @jitable

@@ -20,7 +20,7 @@ from mbsim.core.rotation import matrix_from_quaternion, norm, unrotate, vector
 from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
 from mbsim.dynamics.bodies.configuration import turn
 from mbsim.dynamics.bodies.kinematics import place_bodies
-from mbsim.stepping.arrays import ASLEEP, LEFT_SPEED, POINTS, STEP_LENGTH, Stepping
+from mbsim.stepping.arrays import ASLEEP, LEFT_SPEED, POINTS, STEP_LENGTH, W_NN, Stepping
 from mbsim.stepping.one_point import velocity_of
 
 #: Of `Points.part` and `Motion.part`: no impact with restitution.
@@ -130,11 +130,26 @@ def fill_shift(scene: Scene, S: Stepping) -> None:
 
 
 @jitable
+def comes_at(S: Stepping, k: int) -> float:
+    """Return how fast point k closes: at the step's begin, or before an impact in it.
+
+    What rises at its begin may come down within it. Of what other points hold, and would come
+    there alone, the solver may leave an impulse that changes nothing.
+    """
+    P = S.points
+    speed = P.closing[k]
+    if P.part[k] != NO_IMPACT and P.given[k, W_NN] * P.r[k, 0] > S.plan.number[LEFT_SPEED]:
+        met = speed + P.part[k] * (velocity_of(P, k, 0, S.motion.free) - speed)
+        speed = min(speed, met)
+    return -speed
+
+
+@jitable
 def velocities_jump(scene: Scene, S: Stepping) -> bool:
     """Return whether some body met another one in the step: velocities jump within it."""
     P, M, seen = S.points, S.motion, S.plan.number[LEFT_SPEED]
     for k in range(S.tally.count[POINTS]):
-        if P.r[k, 0] > 0.0 and -P.closing[k] > seen:
+        if P.r[k, 0] > 0.0 and comes_at(S, k) > seen:
             return True
     if S.tally.count[POINTS] == 0:
         return False

@@ -25,6 +25,7 @@ from mbsim.stepping.arrays import (
     POINTS,
     Stepping,
 )
+from mbsim.stepping.displacements import comes_at
 from mbsim.stepping.step import take_step
 
 #: What impacts may leave off without a word, over tol times the length: `results.audit`.
@@ -44,10 +45,13 @@ def find_fastest(scene: Scene, S: Stepping, h: float) -> float:
     number[FASTEST] = number[CLOSED] = 0.0
     for k in range(S.tally.count[POINTS]):
         c = P.contact[k]
-        part = -h * P.closing[k] / scene.scales.length[scene.scales.of_contact[c]]
-        if P.r[k, 0] > 0.0 and part > most:
+        if P.r[k, 0] == 0.0:
+            continue
+        closed = h * comes_at(S, k)
+        part = closed / scene.scales.length[scene.scales.of_contact[c]]
+        if part > most:
             most = part
-            number[FASTEST], number[CLOSED] = c, -h * P.closing[k]
+            number[FASTEST], number[CLOSED] = c, closed
     return most
 
 

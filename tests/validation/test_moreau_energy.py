@@ -1,0 +1,91 @@
+"""MOREAU: what contacts take is what is missing of the energy, however long a step is.
+
+In rows between steps too: they are before an impact or behind it.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mbsim
+from helpers import rigid_decks as decks
+from helpers.folders import MODELS
+from mbsim.bench import deck as text
+from mbsim.results.reading import Results
+
+
+def unbalanced(results: Results) -> np.ndarray:
+    """Return what is missing of the energy at each row, over its size."""
+    energy = results["energy/kinetic"] + results["energy/potential"] + results["energy/dissipated"]
+    size = max(np.ptp(results["energy/potential"]), results["energy/kinetic"].max())
+    return np.abs(energy - energy[0]) / size
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("h", [0.3, 0.1, 0.031, None])
+def test_a_ball_that_lands_or_rebounds_in_a_long_step(
+    tmp_path: Path, e: float, h: float | None
+) -> None:
+    """One that rests behind an impact is not pulled on by its weight there."""
+    results = mbsim.simulate(decks.ball(tmp_path, 0.5, e, 2.0, h), integrator="MOREAU", tol=1e-4)
+    assert unbalanced(results).max() < 1e-9
+    assert np.diff(results["energy/dissipated"]).min() > -1e-9
+
+
+@pytest.mark.parametrize("mu", [0.2, 0.5])
+@pytest.mark.parametrize("gap", [1e-4, 1e-6])
+@pytest.mark.parametrize("h", [0.1, None])
+def test_a_block_that_comes_to_lie_on_a_slope(
+    tmp_path: Path, mu: float, gap: float, h: float | None
+) -> None:
+    """It begins a little above it; friction holds it or lets it slide, and never drives it."""
+    parts = [
+        decks.cube(2, 1.0, 0.2, (0.0, 0.0, 0.1 + gap)),
+        text.contact(301, [200], [100], **decks.rubbed(mu)),
+        text.gravity(3.355, -9.218),
+    ]
+    results = mbsim.simulate(
+        decks.model(tmp_path, parts, 3.0, h, 0.1), integrator="MOREAU", tol=1e-4
+    )
+    lost = results["energy/dissipated"]
+    assert np.diff(lost).min() > -1e-5
+    # rows within a long step have losses on a straight line
+    energy = (results["energy/kinetic"] + results["energy/potential"] + lost)[[0, -1]]
+    assert energy[1] == pytest.approx(energy[0], abs=2e-3 * max(1.0, lost[-1]))
+    if h is None:
+        assert results.audit.warnings == ()
+
+
+@pytest.mark.parametrize("tol", [1e-4, 1e-5])
+def test_a_block_that_has_rocked_rests_without_taking_energy(tol: float) -> None:
+    """Behind infinitely many impacts steps by error get long; its points lie on, or nearly so."""
+    deck = (MODELS / "rigid" / "rocking_block.xml").read_text(encoding="utf-8")
+    free = deck.replace(' h_max="0.0005" h_min="0.0005"', "")
+    assert free != deck
+    results = mbsim.simulate(free, tol=tol)
+    lost = results["energy/dissipated"]
+    assert np.diff(lost[results["time"] > 4.0]).min() > -1e-6
+    assert lost[-1] < results["energy/potential"][0] - results["energy/potential"][-1] + 1e-6
+    assert results.audit.warnings == ()
+
+
+@pytest.mark.parametrize("h", [0.1, 0.07, 0.04])
+def test_rows_that_a_steps_begin_misses_by_rounding(tmp_path: Path, h: float) -> None:
+    """Steps go on from rows, whose times are not theirs to the last bit; the ball is elastic.
+
+    Its energy at each row is what it had; on a line through the impact it would be less.
+    """
+    for dt in (0.01, 0.02, 0.005):
+        model = decks.ball(tmp_path, 0.5, 1.0, 2.0, h)
+        results = mbsim.simulate(model, integrator="MOREAU", print_interval=dt)
+        energy = results["energy/kinetic"] + results["energy/potential"]
+        assert np.abs(energy - energy[0]).max() < 1e-9
+
+
+def test_an_impact_of_what_rises_at_the_begin_of_a_step_is_one(tmp_path: Path) -> None:
+    """A ball hops as high as it flies within half a step; rows between are of its hops."""
+    results = mbsim.simulate(decks.ball(tmp_path, 0.5, 0.5, 1.2, 0.1), integrator="MOREAU")
+    assert unbalanced(results).max() < 1e-9
