@@ -112,7 +112,8 @@ def run(options):
     folder.mkdir(exist_ok=True)
     done = {(r["deck"], r["method"], r["tol"]) for r in rows(out)}
     decks = [Path(deck) if deck.endswith(".xml") else named(deck) for deck in options.decks]
-    for path in decks or sorted((ROOT / "models").rglob("*.xml")):
+    folders = (ROOT / "models", ROOT / "models" / "stiff")
+    for path in decks or sorted(each for folder in folders for each in folder.glob("*.xml")):
         exact, known = None, math.nan
         if not options.no_errors:
             exact, known = reference(path, folder, options.reference, 4.0 * options.limit)

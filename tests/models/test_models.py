@@ -49,7 +49,11 @@ def test_every_deck_has_a_test():
 def test_every_deck_is_in_the_manual():
     pages = MODELS.parent / "mbsim" / "manual" / "pages" / "trust"
     listed = set()
-    for page, folder in (("verification", "."), ("verification-stiff", "stiff")):
+    for page, folder in (
+        ("verification", "."),
+        ("verification-stiff", "stiff"),
+        ("verification-rigid", "rigid"),
+    ):
         lines = (pages / f"{page}.md").read_text("utf-8").splitlines()
         rows = [line for line in lines if line.startswith("| `")]
         names = {name for row in rows for name in re.findall(r"`(\w+\.xml)`", row.split("|")[1])}
