@@ -20,7 +20,11 @@ if TYPE_CHECKING:
     from mbsim.fclib.solve import Result
 
 _FILES = click.argument(
-    "files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE.hdf5..."
+    "files",
+    nargs=-1,
+    required=True,
+    type=click.Path(path_type=Path),
+    metavar="FILE.hdf5|FOLDER...",
 )
 _JSON = json_option("a JSON list")
 
@@ -132,7 +136,7 @@ def solve(
     output: Path | None,
     as_json: bool,
 ) -> None:
-    """Solve the problem in each FILE and say how good the solution is.
+    """Solve the problem in each FILE, and in those of a FOLDER, and say how good the solution is.
 
     Exit code 3 if one is not solved; its best iterate is written all the same. "solved relative":
     only the published relative error is met, and a contact may be wrong by more than its own size.
@@ -169,6 +173,8 @@ def solve(
             _show_solved(found[-1], result.reason)
     if as_json:
         _print_list(found)
+    elif len(found) > 1:
+        _show_all(found)
     _end(faults)
 
 
@@ -438,4 +444,19 @@ def _show_solved(entry: dict[str, Any], reason: str) -> None:
         f"|r| {entry['impulse_norm']:.3g}, "
         f"cone violation {entry['max_cone_violation']:.1e}, penetration velocity "
         f"{entry['max_penetration_velocity']:.1e}; {states}"
+    )
+
+
+def _show_all(found: Sequence[dict[str, Any]]) -> None:
+    """Print a line on all problems."""
+    counts = [entry["contacts"] for entry in found]
+    statuses = [entry["status"] for entry in found]
+    ends = ", ".join(
+        f"{statuses.count(status)} {status.replace('_', ' ')}" for status in dict.fromkeys(statuses)
+    )
+    seconds = sum(entry["solve_s"] for entry in found)
+    echo(
+        f"{len(found)} problems of {min(counts)} to {max(counts)} contacts: {ends}, in "
+        f"{seconds:.3g} s; largest error {max(entry['error'] for entry in found):.1e}, scale-free "
+        f"{max(entry['scale_free'] for entry in found):.1e}"
     )

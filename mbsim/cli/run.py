@@ -88,6 +88,12 @@ _METHODS = ", ".join(f"{name} ({what})" for name, what in METHODS.items())
     help="Write the contact problem of every N-th step, FCLIB files in DIR/fclib.",
 )
 @click.option(
+    "--dump-hardest",
+    type=click.IntRange(min=1),
+    metavar="K",
+    help="Keep the K of them that took MOREAU most sweeps; of every step without --dump-fclib.",
+)
+@click.option(
     "--verify",
     is_flag=False,
     flag_value="once",

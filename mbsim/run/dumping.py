@@ -13,9 +13,11 @@ u_N >= 0 opens. What the contacts of the run push is in the file too, times h, a
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -36,6 +38,9 @@ _PUSH = 10.0
 class ContactProblems:
     """Writes the contact problems of a run.
 
+    One that was written already but for its scale and tol, as those of a scene at rest, is passed
+    over.
+
     Parameters
     ----------
     name
@@ -44,56 +49,162 @@ class ContactProblems:
         Steps from one problem to the next.
     folder
         Where files go, `<model>-i<step>-<contacts>.hdf5`; it must hold none, unless `resumed`.
-    make
-        Returns problem and guess of the step h that ends at (t, y), given as (t, h, y); None where
-        nothing touches.
+    maker
+        Makes problems of steps.
+    hardest
+        How many to keep, those whose steps took most sweeps; None for all.
     """
 
     def __init__(
-        self,
-        name: str,
-        every: int,
-        folder: Path,
-        make: Callable[[float, float, Array], tuple[Any, Any] | None],
-        resumed: bool,
+        self, name: str, every: int, folder: Path, maker: Maker, resumed: bool, hardest: int | None
     ) -> None:
         self.name, self.every, self.folder = name, every, folder
-        self._make = make
-        self.written, self.next = 0, every
-        self._files: list[Path] = []
-        if every < 1:
-            raise ModelError(f"dump_fclib={every}: must be a whole number > 0")
+        self._maker, self._hardest, self.next = maker, hardest, every
+        self._kept: list[Kept] = []
+        for word, number in (("dump_fclib", every), ("dump_hardest", hardest)):
+            if number is not None and number < 1:
+                raise ModelError(f"{word}={number}: must be a whole number > 0")
+        if hardest is not None and maker.sweeps is None:
+            raise ModelError(
+                "dump_hardest is for integrator MOREAU: other methods solve no contact problems"
+            )
+        self._swept = maker.sweeps() if maker.sweeps is not None else 0
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            if not resumed and any(folder.glob("*.hdf5")):
-                raise ResultsError(
-                    f"{folder}: holds problems of an earlier run; move them, or choose another "
-                    "folder with -o"
-                )
+            there = sorted(folder.glob("*.hdf5"))
         except OSError as error:
             raise ResultsError(f"{folder}: {error.strerror}") from None
+        if there and not resumed:
+            raise ResultsError(
+                f"{folder}: holds problems of an earlier run; move them, or choose another "
+                "folder with -o"
+            )
+        self._kept = [_read(file) for file in there]
+        self._kept.sort(key=lambda kept: kept.step)
+
+    @property
+    def written(self) -> int:
+        """How many problems there are."""
+        return len(self._kept)
 
     def watch(self, step: int, t: float, h: float, y: Array) -> None:
-        """Write the problem if this step's turn has come and something touches."""
+        """Write the problem if this step's turn has come, something touches and it is wanted."""
+        sweeps = 0
+        if self._maker.sweeps is not None:
+            swept = self._maker.sweeps()
+            sweeps, self._swept = swept - self._swept, swept
         if step < self.next:
             return
         self.next = step - step % self.every + self.every
-        made = self._make(t, h, y)
+        # a resumed run may come by a step again
+        self._kept = [kept for kept in self._kept if kept.step != step]
+        least = min(self._kept, key=lambda kept: (kept.sweeps, -kept.step), default=None)
+        full = self._hardest is not None and len(self._kept) >= self._hardest
+        if full and least is not None and sweeps <= least.sweeps:
+            return
+        made = self._maker.make(t, h, y)
         if made is None:
+            return
+        problem, guess = made
+        form = Form(problem)
+        others = self._kept if self._hardest is not None else self._kept[-1:]
+        if any(form.is_same(kept.form, self._maker.tol) for kept in others):
             return
         from mbsim.fclib import hdf5
 
-        problem, guess = made
-        name = f"{self.name}-i{step}-{problem.contacts}.hdf5"
-        hdf5.write(self.folder / name, problem, guesses=[guess])
-        self._files.append(self.folder / name)
-        self.written += 1
+        if self._maker.sweeps is not None:
+            said = f"{problem.info.description}, sweeps {sweeps}"
+            problem = replace(problem, info=replace(problem.info, description=said))
+        if full and least is not None:
+            least.file.unlink(missing_ok=True)
+            self._kept.remove(least)
+        file = self.folder / f"{self.name}-i{step}-{problem.contacts}.hdf5"
+        hdf5.write(file, problem, guesses=[guess])
+        self._kept.append(Kept(step, sweeps, file, form))
 
     def begin_anew(self) -> None:
         """Take back all problems: the run begins anew."""
-        for file in self._files:
-            file.unlink(missing_ok=True)
-        self.written, self.next, self._files = 0, self.every, []
+        for kept in self._kept:
+            kept.file.unlink(missing_ok=True)
+        self._kept, self.next = [], self.every
+
+
+class Maker(NamedTuple):
+    """What makes contact problems of steps.
+
+    Attributes
+    ----------
+    make
+        Returns problem and guess of the step h that ends at (t, y), given as (t, h, y); None where
+        nothing touches.
+    sweeps
+        Sweeps and Newton iterations of the run so far; None where none are made.
+    tol
+        The run's.
+    """
+
+    make: Callable[[float, float, Array], tuple[Any, Any] | None]
+    sweeps: Callable[[], int] | None
+    tol: float
+
+
+class Kept(NamedTuple):
+    """A problem that was written."""
+
+    step: int
+    sweeps: int
+    file: Path
+    form: Form
+
+
+class Form:
+    """A contact problem but for its scale: W, and the direction of q.
+
+    r(c q) = c r(q) for c > 0: Coulomb's law is one of cones.
+    """
+
+    def __init__(self, problem: Any) -> None:
+        self.numbers: list[Array] = [problem.mu]
+        if problem.kind == "local":
+            q = problem.q
+            matrices = [problem.W]
+        else:
+            from scipy.sparse.linalg import spsolve
+
+            H = problem.H.csr()
+            q = H.T @ spsolve(problem.M.csr().tocsc(), problem.f) + problem.w
+            matrices = [problem.M, problem.H]
+        for matrix in matrices:
+            coordinates = matrix.csr().tocoo()
+            self.numbers += [coordinates.row, coordinates.col, coordinates.data]
+        size = float(np.abs(q).max(initial=0.0))
+        self.numbers.append(q / size if size > 0.0 else q)
+
+    def is_same(self, other: Form, tol: float) -> bool:
+        """Return whether each number is the other's but for `tol` of the largest of its kind."""
+        for mine, its in zip(self.numbers, other.numbers, strict=False):
+            if mine.shape != its.shape:
+                return False
+            size = float(np.abs(mine).max(initial=0.0))
+            if not bool((np.abs(mine - its) <= tol * size).all()):
+                return False
+        return len(self.numbers) == len(other.numbers)
+
+
+def _read(file: Path) -> Kept:
+    """Return a problem that an earlier part of the run wrote."""
+    from mbsim.fclib import hdf5
+
+    problem = hdf5.read(file).problem
+    said = "" if problem.info is None else problem.info.description or ""
+    step = re.search(r"-i(\d+)-\d+$", file.stem)
+    sweeps = re.search(r"sweeps (\d+)", said)
+    return Kept(
+        int(step.group(1)) if step else 0,
+        int(sweeps.group(1)) if sweeps else 0,
+        file,
+        Form(problem),
+    )
 
 
 class CompliantContacts:
@@ -266,15 +377,20 @@ class CompliantContacts:
         return across / float(force[0]) if across > 0.0 and force[0] > 0.0 else 0.0
 
 
-def problems_of(run: Runner) -> Callable[[float, float, Any], Any]:
-    """Return what makes contact problems of steps of a run: (t, h, y)."""
+def problems_of(run: Runner) -> Maker:
+    """Return what makes contact problems of steps of a run."""
     from mbsim.arrays.hooks import Joints
 
-    rigid, name = run.methods.rigid, run.system.model.name
+    rigid, name, tol = run.methods.rigid, run.system.model.name, run.settings.stages[0].tol
     if rigid is not None:
-        from mbsim.stepping.contact_problem import contact_problem
+        from mbsim.stepping.contact_problem import contact_problem, sweeps_so_far
 
-        return lambda t, h, y: contact_problem(rigid.stepping, name, t)
+        stepping = rigid.stepping
+        return Maker(
+            lambda t, h, y: contact_problem(stepping, name, t),
+            lambda: sweeps_so_far(stepping),
+            tol,
+        )
     idle = np.zeros(len(run.method.y))
 
     def evaluate(t: float, y: Any) -> float:
@@ -283,4 +399,4 @@ def problems_of(run: Runner) -> Callable[[float, float, Any], Any]:
     def accelerate(t: float, y: Any, dy: Any) -> None:
         run.hooks.ask_joints(Joints.ACCELERATE, t, y, dy)
 
-    return CompliantContacts(run.system, evaluate, accelerate).problem
+    return Maker(CompliantContacts(run.system, evaluate, accelerate).problem, None, tol)

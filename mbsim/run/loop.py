@@ -130,8 +130,8 @@ class Runner:
         # one that follows and moves nothing has the same row at its begin
         return len(stages) == 1 or (not any(s.takes_time for s in stages) and stages[1].is_static)
 
-    def dump_every(self, every: int, resumed: bool) -> None:
-        """Write the contact problem of every so many steps from here on."""
+    def dump_every(self, every: int, resumed: bool, hardest: int | None) -> None:
+        """Write the contact problem of every so many steps from here on, or the hardest of them."""
         from mbsim.integrators import scheme
         from mbsim.run.dumping import ContactProblems, problems_of
 
@@ -139,7 +139,7 @@ class Runner:
         if folder is None:
             raise ModelError("dump_fclib needs an output folder")
         self.dump = ContactProblems(
-            self.system.model.name, every, folder / "fclib", problems_of(self), resumed
+            self.system.model.name, every, folder / "fclib", problems_of(self), resumed, hardest
         )
         self.dump.next += int(self.method.counts[scheme.STEPS]) // every * every
 

@@ -29,6 +29,7 @@ class Options:
     interpret_plugins: bool = False
     allow_overlap: bool = False
     dump_fclib: int | None = None
+    dump_hardest: int | None = None
     signals: tuple[str, ...] = ()
     contact_points: bool = False
     scripts: bool = True

@@ -78,6 +78,7 @@ def simulate(
     interpret_plugins: bool = False,
     allow_overlap: bool = False,
     dump_fclib: int | None = None,
+    dump_hardest: int | None = None,
     signals: Sequence[str] = (),
     contact_points: bool = False,
     scripts: bool = True,
@@ -118,6 +119,8 @@ def simulate(
         Do not compile user subroutines; start although shapes overlap deeply.
     dump_fclib : int, optional
         Write the frictional contact problem of every so many steps into `output`/fclib.
+    dump_hardest : int, optional
+        Keep so many of them, which took MOREAU most sweeps; of every step without `dump_fclib`.
     signals : sequence of str
         Names or patterns of what to record, ``bodies/2/position``, ``contacts/*/force``,
         ``joints``, beside time, events and requests; default: everything.
@@ -158,6 +161,7 @@ def simulate(
         interpret_plugins=interpret_plugins,
         allow_overlap=allow_overlap,
         dump_fclib=dump_fclib,
+        dump_hardest=dump_hardest,
         signals=tuple(signals),
         contact_points=contact_points,
         scripts=scripts,
@@ -244,8 +248,9 @@ def _run(model: Model, options: Options) -> Results:
                     from mbsim.run.sensitivity import attach
 
                     attach(runner, found, options.sensitivity_worth)
-                if options.dump_fclib is not None:
-                    runner.dump_every(options.dump_fclib, options.resume)
+                if options.dump_fclib is not None or options.dump_hardest is not None:
+                    every = 1 if options.dump_fclib is None else options.dump_fclib
+                    runner.dump_every(every, options.resume, options.dump_hardest)
                 runner.most_evaluations = options.most_evaluations
                 runner.run(options.progress, options.resume)
                 recorder.end()

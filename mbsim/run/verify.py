@@ -50,6 +50,7 @@ class Reruns:
             output=None,
             resume=False,
             dump_fclib=None,
+            dump_hardest=None,
             verify=False,
             notify=None,
             sensitivity=(),

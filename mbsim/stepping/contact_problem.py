@@ -15,7 +15,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbsim.stepping.arrays import POINTS, PRESSING, STEP_LENGTH, Stepping
+from mbsim.stepping.arrays import (
+    ALL_SWEEPS,
+    NEWTONS,
+    POINTS,
+    PRESSING,
+    STEP_LENGTH,
+    Stepping,
+)
 from mbsim.stepping.one_point import directions
 
 if TYPE_CHECKING:
@@ -63,6 +70,11 @@ def contact_problem(S: Stepping, title: str, t: float) -> tuple[Global | Local, 
     v = free + inverse @ (H @ r)
     problem = Global(3, matrix(masses), matrix(H), masses @ free, w, mu, info=info)
     return problem, Solution(H.T @ v + w, r, v)
+
+
+def sweeps_so_far(S: Stepping) -> int:
+    """Return how many sweeps and Newton iterations the run's contact problems took."""
+    return int(S.tally.count[ALL_SWEEPS] + S.tally.count[NEWTONS])
 
 
 def _directions(S: Stepping, count: int) -> Any:
