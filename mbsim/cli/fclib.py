@@ -136,7 +136,7 @@ def solve(
     output: Path | None,
     as_json: bool,
 ) -> None:
-    """Solve the problem in each FILE, and in those of a FOLDER, and say how good the solution is.
+    """Solve the problem in each FILE and say how good the solution is.
 
     Exit code 3 if one is not solved; its best iterate is written all the same. "solved relative":
     only the published relative error is met, and a contact may be wrong by more than its own size.
