@@ -58,6 +58,7 @@ from mbsim.stepping.displacements import (
     spread_parts,
     velocities_jump,
 )
+from mbsim.stepping.driven import add_work_of_motions, presses_on_driven
 from mbsim.stepping.energy import add_losses, keep_left, left_by_forces, left_by_spins
 from mbsim.stepping.forces import find_forces, find_motion
 from mbsim.stepping.free_motion import fill_motion
@@ -425,6 +426,8 @@ def take_step(
     move_bodies(scene, S, y, h, new)
     keep_left(S, left + left_by_spins(scene, S, new), committed)
     if S.tally.count[PRESSING] > 0:
+        if presses_on_driven(scene, S):
+            code = add_work_of_motions(scene, S, t, h, y, new)
         # impulses may throw bodies farther than was looked for
         if not place_graphics(scene, new):
             code = Code.TOO_FAR

@@ -89,3 +89,42 @@ def test_an_impact_of_what_rises_at_the_begin_of_a_step_is_one(tmp_path: Path) -
     """A ball hops as high as it flies within half a step; rows between are of its hops."""
     results = mbsim.simulate(decks.ball(tmp_path, 0.5, 0.5, 1.2, 0.1), integrator="MOREAU")
     assert unbalanced(results).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("deck", "part"),
+    [("belt_stick_slip", 1e-5), ("cam", 0.02), ("cam_roller", 0.02), ("geneva", 1e-3)],
+)
+def test_motions_do_the_work_of_what_contacts_press_on_them(deck: str, part: float) -> None:
+    """A belt that drags a block, cams that lift, a crank that turns a wheel."""
+    results = mbsim.simulate(mbsim.read_model(MODELS / f"{deck}.xml"), integrator="MOREAU")
+    assert results.audit.warnings == ()
+    given = results["energy/work_of_motions"]
+    energy = results["energy/kinetic"] + results["energy/potential"] + results["energy/dissipated"]
+    size = max(np.ptp(given), np.ptp(energy))
+    assert np.abs(energy - energy[0] - given + given[0]).max() < part * size
+
+
+@pytest.mark.parametrize("h", [0.01, 0.002])
+def test_a_belt_drags_with_the_work_of_its_friction(tmp_path: Path, h: float) -> None:
+    """A cube is put on a plate that a motion drives at 1 m/s: it gets m v^2/2, and as much is lost.
+
+    mu g t = v: it goes along after 0.204 s.
+    """
+    parts = [
+        text.cuboid(2, 5.0, (4.0, 1.0, 0.2), (0.0, 0.0, -0.1)),
+        text.marker(12, 1, (0.0, 0.0, 0.0), [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]),
+        text.marker(22, 2, (0.0, 0.0, 0.0), [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]),
+        text.joint(1, "TRANSLATIONAL", 22, 12),
+        '<Motion_Joint id="1" joint_id="1" motion_type="T" '
+        'val_type="V" expr="1"/>',
+        decks.cube(3, 1.0, 0.2, (0.0, 0.0, 0.1)),
+        text.contact(301, [300], [200], **decks.rubbed(0.5)),
+        text.gravity(),
+    ]
+    results = mbsim.simulate(decks.model(tmp_path, parts, 0.5, h), integrator="MOREAU")
+    assert results["bodies/3/velocity"][-1, 0] == pytest.approx(1.0, rel=1e-6)
+    given = results["energy/work_of_motions"]
+    assert given[-1] - given[0] == pytest.approx(1.0, rel=0.02)
+    assert results["energy/dissipated"][-1] == pytest.approx(0.5, rel=0.02)
+    assert results.audit.warnings == ()
