@@ -16,7 +16,7 @@ from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.pipeline.evaluate import add_gravity
 from mbsim.stepping.arrays import THETA, WOKEN, Stepping
 from mbsim.stepping.displacements import move_bodies
-from mbsim.stepping.free_motion import fill_motion, start_from
+from mbsim.stepping.free_motion import fill_motion, start_from, turn_to_global
 from mbsim.stepping.implicit import choose_theta, factor_forces, is_implicit, take_into_step
 from mbsim.stepping.sleep import wake_loaded
 
@@ -50,6 +50,7 @@ def find_motion(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> int:
     if not is_implicit(S):
         code = find_forces(scene, t, y, dy)
         wake_loaded(scene, S)
+        turn_to_global(scene, dy)
         fill_motion(scene, S, y, h)
         return code
     part = S.forces.number[THETA] * h
@@ -65,6 +66,7 @@ def find_motion(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> int:
     code = factor_forces(scene, S, t + part, h, middle, dy)
     if code != 0:
         return code
+    turn_to_global(scene, dy)
     place_bodies(scene, y)
     fill_motion(scene, S, y, h)
     return take_into_step(scene, S, h, dy, True)

@@ -111,8 +111,26 @@ def start_from(scene: Scene, S: Stepping, y: F1) -> None:
 
 
 @jitable
+def turn_to_global(scene: Scene, dy: F1) -> None:
+    """Turn angular accelerations of what joints hold to global axes, from where bodies are.
+
+    They belong to the attitude that they were found in, be that the step's begin or its middle.
+    """
+    for row in range(bodies_awake(scene)):
+        b = body_awake(scene, row)
+        if scene.tree.of_body[b] >= 0:
+            at = BODY_SIZE * b + AT_W
+            turns = rotate(scene.work.R[b], vector(dy, at))
+            for c in range(3):
+                dy[at + c] = turns[c]
+
+
+@jitable
 def fill_motion(scene: Scene, S: Stepping, y: F1, h: float) -> None:
-    """Fill velocities before the step and without contacts, and inverse masses."""
+    """Fill velocities before the step and without contacts, and inverse masses.
+
+    Bodies are as at the step's begin; accelerations are those of `turn_to_global`.
+    """
     M, bodies, dy = S.motion, scene.bodies, S.motion.slope
     stand(S, len(bodies.mass))
     for row in range(bodies_awake(scene)):
@@ -127,7 +145,7 @@ def fill_motion(scene: Scene, S: Stepping, y: F1, h: float) -> None:
             before[c], before[3 + c] = y[at + AT_V + c], w[c]
             free[c] = y[at + AT_V + c] + h * dy[at + AT_V + c]
         if scene.tree.of_body[b] >= 0:
-            w = add(w, scale(h, rotate(R, vector(dy[at + AT_W :]))))
+            w = add(w, scale(h, vector(dy, at + AT_W)))
         else:
             w = spin_freely(scene, y, b, h)
         for c in range(3):

@@ -111,6 +111,8 @@ def keep_velocities(scene: Scene, x: F1, less: F1, part: float) -> None:
 def find_stiffness(scene: Scene, S: Stepping, h: float) -> int:
     """Measure the stiffest of forces by one more power of what A takes off; return 0 or a code."""
     F, x, found = S.forces, S.forces.stiffest, S.forces.found
+    # A^-1 takes off all that is across joints, which have turned since the last step
+    keep_to_joints(scene, S, x)
     size = energy_of(scene, x)
     if not size > 0.0:
         # begin with what forces do

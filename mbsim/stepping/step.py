@@ -61,7 +61,7 @@ from mbsim.stepping.displacements import (
 from mbsim.stepping.driven import add_work_of_motions, presses_on_driven
 from mbsim.stepping.energy import add_losses, keep_left, left_by_forces, left_by_spins
 from mbsim.stepping.forces import find_forces, find_motion
-from mbsim.stepping.free_motion import fill_motion
+from mbsim.stepping.free_motion import fill_motion, turn_to_global
 from mbsim.stepping.friction import (
     coefficient,
     keep_loads,
@@ -357,6 +357,7 @@ def solve_by_middle(scene: Scene, S: Stepping, t: float, h: float, y: F1, commit
     wake_loaded(scene, S)
     if code != 0 or S.rest.count[WOKEN] == 1:
         return code
+    turn_to_global(scene, dy)
     place_bodies(scene, y)
     fill_motion(scene, S, y, h)
     if is_implicit(S):

@@ -116,8 +116,7 @@ def test_a_belt_drags_with_the_work_of_its_friction(tmp_path: Path, h: float) ->
         text.marker(12, 1, (0.0, 0.0, 0.0), [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]),
         text.marker(22, 2, (0.0, 0.0, 0.0), [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]),
         text.joint(1, "TRANSLATIONAL", 22, 12),
-        '<Motion_Joint id="1" joint_id="1" motion_type="T" '
-        'val_type="V" expr="1"/>',
+        '<Motion_Joint id="1" joint_id="1" motion_type="T" val_type="V" expr="1"/>',
         decks.cube(3, 1.0, 0.2, (0.0, 0.0, 0.1)),
         text.contact(301, [300], [200], **decks.rubbed(0.5)),
         text.gravity(),
