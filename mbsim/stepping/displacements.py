@@ -134,11 +134,11 @@ def comes_at(S: Stepping, k: int) -> float:
     """Return how fast point k closes: at the step's begin, or before an impact in it.
 
     What rises at its begin may come down within it. Of what other points hold, and would come
-    there alone, the solver may leave an impulse that changes nothing.
+    there alone, the solver may leave an impulse of a few times what it may leave.
     """
-    P = S.points
+    P, left = S.points, JUMPS * S.plan.number[LEFT_SPEED]
     speed = P.closing[k]
-    if P.part[k] != NO_IMPACT and P.given[k, W_NN] * P.r[k, 0] > S.plan.number[LEFT_SPEED]:
+    if P.part[k] != NO_IMPACT and P.given[k, W_NN] * P.r[k, 0] > left:
         met = speed + P.part[k] * (velocity_of(P, k, 0, S.motion.free) - speed)
         speed = min(speed, met)
     return -speed
