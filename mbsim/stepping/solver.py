@@ -24,8 +24,10 @@ from mbsim.fclib.bodies.solve import solve_contacts
 from mbsim.stepping.arrays import ALONG, W_NN, W_XX, W_ZZ, Motion, Points
 from mbsim.stepping.one_point import apply, fill_directions, solve_point, velocity_of
 
-#: Sweeps before Newton's method, and behind it, at most.
-FEW_SWEEPS, MOST_SWEEPS = 40, 400
+#: Sweeps before Newton's method of up to `FEW_POINTS` points, and of more points and behind it, at
+#: most. An iteration of Newton's method takes as long as 80 sweeps: stacks want few of them, piles
+#: of round bodies tens, or it gets nowhere.
+FEW_SWEEPS, MOST_SWEEPS, FEW_POINTS = 40, 400, 64
 #: Sweeps between looks at how much the bodies' velocities change in the step.
 LOOKS = 8
 #: What impacts may leave at most, over what the solver may leave where nothing meets.
@@ -293,7 +295,8 @@ def solve_points(
     See `sweep_on`. r and v are as a guess says: r of the last step, v with that. A few sweeps do
     where little changed; Newton's method does what they leave, and sweeps what it leaves.
     """
-    left, sweeps, solved = sweep_on(p, M, count, allowed, FEW_SWEEPS)
+    most = FEW_SWEEPS if count <= FEW_POINTS else MOST_SWEEPS
+    left, sweeps, solved = sweep_on(p, M, count, allowed, most)
     if solved:
         return left, sweeps, 0, solved
     newtons = 0
