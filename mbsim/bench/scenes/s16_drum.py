@@ -119,7 +119,7 @@ def _scene(drum: d.Drum, **changes: Any) -> Scene:
         second=("pen_max_over_r", "over all steps, which is what counts"),
         pass_below=PASS,
         integrators=("VERLET", "MOREAU"),
-        tolerances=(1e-2,),
+        tolerances=(1e-1, 1e-2),
         sample=drum.sample,
         repeats=1,
         limit=60.0,
