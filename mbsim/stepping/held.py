@@ -150,24 +150,30 @@ def widen(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
         plan.group[P.body[k, 0]] >= 0 and answer_body(scene, S, P.body[k, 0]),
         plan.group[P.body[k, 1]] >= 0 and answer_body(scene, S, P.body[k, 1]),
     )
+    unknown = (
+        plan.group[P.body[k, 0]] >= 0 and not known[0],
+        plan.group[P.body[k, 1]] >= 0 and not known[1],
+    )
     for a in range(3):
-        begin_impulse(S)
-        some = False
-        for side in range(2):
-            b = P.body[k, side]
-            if plan.group[b] >= 0 and not known[side]:
-                some, answers_alone = True, scene.tree.of_body[b] < 0
-                for c in range(6):
-                    e = direction(P, k, side, a, c)
-                    impulse[6 * b + c] += alone(P, k, side, a, c) if answers_alone else e
-        if some:
+        if unknown[0] or unknown[1]:
+            begin_impulse(S)
+            for side in range(2):
+                b = P.body[k, side]
+                if unknown[side]:
+                    answers_alone = scene.tree.of_body[b] < 0
+                    for c in range(6):
+                        e = direction(P, k, side, a, c)
+                        impulse[6 * b + c] += alone(P, k, side, a, c) if answers_alone else e
             turn_into_velocities(scene, S)
         for row in range(begin, begin + P.many[k]):
             b = P.moved[row]
             side = 0 if b == P.body[k, 0] else 1
             for c in range(6):
-                held = plan.group[b] >= 0
-                P.moves[row, c, a] = impulse[6 * b + c] if held else alone(P, k, side, a, c)
+                if plan.group[b] < 0:
+                    P.moves[row, c, a] = alone(P, k, side, a, c)
+                else:
+                    found = unknown[0] or unknown[1]
+                    P.moves[row, c, a] = impulse[6 * b + c] if found else 0.0
         for side in range(2):
             if known[side]:
                 add_answer(S, k, side, a)
