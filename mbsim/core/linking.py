@@ -5,7 +5,7 @@ the caller, so that a chain of n functions is optimised n times over. Here a fun
 compiled code calls keeps the code as it was lowered. A root (what Python, or an address, calls)
 links all that it reaches, once, is optimised and emitted. That code is its own then: nobody else
 calls it, so that LLVM takes away arguments that are not read, and puts a function in its one
-caller's place. A scene is passed on as hundreds of arguments, member by member.
+caller's place. An array is passed on as five words and two for each of its axes.
 
 Numba's own linking is used where its version is not one of those that this was tested with.
 """
