@@ -79,11 +79,11 @@ def is_point(scene: Scene, pair: int, s: int) -> bool:
 
 @jitable
 def slop_of(scene: Scene, S: Stepping, gi: int, gj: int) -> float:
-    """Return the length below which gaps and depths of two graphics do not count.
+    """Return how deep two graphics may be in each other at a step's end.
 
-    It is to the smaller one's diameter what it would be to the length of the scene, so that a
-    small body in a large scene lies on as well as in a small one; but more than what the solver
-    may leave of velocities moves bodies by.
+    It is to the smaller one's diameter what `SLOP` is to the length of the scene, so that a small
+    body in a large scene is no deeper than in a small one; but more than what the solver may leave
+    of velocities moves bodies by.
     """
     number = S.plan.number
     size = 2.0 * min(scene.graphics.radius[gi], scene.graphics.radius[gj])

@@ -25,8 +25,8 @@ from mbsim.stepping.arrays import ALONG, W_NN, W_XX, W_ZZ, Motion, Points
 from mbsim.stepping.one_point import apply, fill_directions, solve_point, velocity_of
 
 #: Sweeps before Newton's method of up to `FEW_POINTS` points, and of more points and behind it, at
-#: most. An iteration of Newton's method takes as long as 80 sweeps: stacks want few of them, piles
-#: of round bodies tens, or it gets nowhere.
+#: most. An iteration of Newton's method takes as long as tens of sweeps: stacks want few of them,
+#: piles of round bodies many, or it gets nowhere.
 FEW_SWEEPS, MOST_SWEEPS, FEW_POINTS = 40, 400, 64
 #: Sweeps between looks at how much the bodies' velocities change in the step.
 LOOKS = 8
@@ -106,8 +106,9 @@ def sweep(p: Points, M: Motion, count: int, number: int) -> tuple[float, float]:
             end += 1
         i, j = p.body[begin, 0], p.body[begin, 1]
         if changed[i] >= number - 1 or changed[j] >= number - 1:
-            first, left, rounds = 0.0, 2.0, 0
-            while 1.0 < left < math.inf and rounds < (MOST_ROUNDS if end > begin + 1 else 1):
+            first, left, rounds = 0.0, 0.0, 0
+            most = MOST_ROUNDS if end > begin + 1 else 1
+            while rounds == 0 or (1.0 < left < math.inf and rounds < most):
                 left, more = solve_pair(p, M.v, begin, end)
                 if rounds == 0:
                     first = left
