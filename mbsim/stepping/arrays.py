@@ -38,8 +38,8 @@ RULE_NUMBERS = 5
 KEPT_POINT, KEPT_NORMAL, KEPT_TANGENT, KEPT_FORCE = 10, 13, 16, 19
 KEPT_COLUMNS = 22
 # entries of `Plan.number`: 1 where the error of steps is not estimated; the length below which gaps
-# between bodies as large as the scene do not count (`points.slop_of`); what the solver may leave of
-# a velocity, times h; 1 where some kind of pair is not near; how fast positions are projected, see
+# and changes of position do not count; what the solver may leave of a velocity, times h; 1 where
+# some kind of pair is not near; how fast positions are projected, see
 # `solver.project_positions`; what may be left of a velocity at most, however short a step; and part
 # of a step's jumps that may; how near to where friction yields a step is to end; the model's own
 # time L/V; how far closing and slipping may go in a step and are none; 1 where bodies at rest may
@@ -155,7 +155,7 @@ class Points(NamedTuple):
     row: I1  # (m,) of the pair
     was: I1  # (m,) row of `Kept` that is the same point, -1 for none
     gap: F1  # (m,)
-    slop: F1  # (m,) gaps and depths below that do not count
+    slop: F1  # (m,) depth at which a step may leave it, see `points.slop_of`
     point: F2  # (m, 3)
     arm: F3  # (m, 2, 3) from the bodies' cg, when the point touches
     normal: F2  # (m, 3)
@@ -252,12 +252,18 @@ class Stepping(NamedTuple):
     forces: Forces
 
 
+def whole(*shape: int) -> np.ndarray:
+    """Return whole numbers, all 0."""
+    return np.zeros(shape, dtype=np.int64)
+
+
+def numbers(*shape: int) -> np.ndarray:
+    """Return numbers, all 0."""
+    return np.zeros(shape)
+
+
 def at_rest(nb: int, nc: int, pairs: int, groups: int, side: I2) -> Rest:
     """Return arrays for bodies of which none sleeps."""
-
-    def whole(*shape: int) -> np.ndarray:
-        return np.zeros(shape, dtype=np.int64)
-
     ng = len(side)
     room = 1 << max(4, int(2 * ng).bit_length())
     return Rest(
@@ -279,13 +285,6 @@ def at_rest(nb: int, nc: int, pairs: int, groups: int, side: I2) -> Rest:
 
 def no_points(m: int, nb: int, wide: int) -> Points:
     """Return empty arrays for m contact points of nb bodies, with so many wide rows."""
-
-    def whole(*shape: int) -> np.ndarray:
-        return np.zeros(shape, dtype=np.int64)
-
-    def numbers(*shape: int) -> np.ndarray:
-        return np.zeros(shape)
-
     return Points(
         slot=whole(m),
         contact=whole(m),
@@ -340,12 +339,6 @@ def make(
     groups of bodies, the user's states; `side` is that of `Rest`.
     """
     nb, ng, ny, m, pairs, wide, groups, nz = sizes
-
-    def whole(*shape: int) -> np.ndarray:
-        return np.zeros(shape, dtype=np.int64)
-
-    def numbers(*shape: int) -> np.ndarray:
-        return np.zeros(shape)
 
     motion = Motion(
         inverse=numbers(nb, 6, 6),
