@@ -10,16 +10,14 @@ import functools
 from collections.abc import Callable
 from typing import Any
 
-from numba import types
-
 from mbsim.core.address import table_at, vector_at
 from mbsim.core.arrays import Pointer
+from mbsim.core.signature import INT, POINTER
 from mbsim.geometry.catalog import POINT, REGION_ROWS, SIZE
 from mbsim.geometry.motion import MOTION
 from mbsim.geometry.region import sum_points
 
-_POINTER = types.CPointer(types.float64)
-SIGNATURE = types.int64(_POINTER, _POINTER, _POINTER, _POINTER, _POINTER)
+SIGNATURE = INT(POINTER, POINTER, POINTER, POINTER, POINTER)
 
 
 @functools.cache

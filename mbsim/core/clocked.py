@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 
 import llvmlite.binding as llvm
 from llvmlite import ir
-from numba import types
+
+from mbsim.core.signature import FLOAT, INT, Kind, Signature
 
 #: Columns of a part's row in the table of counts, and of the row behind the last part.
 TICKS, CALLS = range(2)
@@ -20,15 +21,11 @@ LAST, CURRENT = range(2)
 _WORD = ir.IntType(64)
 
 
-def _llvm_type(given: Any) -> Any:
-    """Return how C passes a value of a Numba type: those that hooks have."""
-    if isinstance(given, types.CPointer):
-        return ir.IntType(8).as_pointer()
-    if given == types.float64:
+def _llvm_type(given: Kind) -> Any:
+    """Return how C passes a value."""
+    if given == FLOAT:
         return ir.DoubleType()
-    if given == types.int64:
-        return _WORD
-    raise TypeError(f"a hook with a value of {given} cannot be timed")
+    return _WORD if given == INT else ir.IntType(8).as_pointer()
 
 
 def _ticks(builder: ir.IRBuilder) -> Any:
@@ -61,11 +58,11 @@ class _Table(NamedTuple):
 
 
 def _define(
-    module: ir.Module, name: str, table: _Table, address: int, part: int, signature: Any
+    module: ir.Module, name: str, table: _Table, address: int, part: int, signature: Signature
 ) -> None:
     """Define a function that calls `address` and counts to a part, less those within it."""
-    arguments = [_llvm_type(each) for each in signature.args]
-    kind = ir.FunctionType(_llvm_type(signature.return_type), arguments)
+    arguments = [_llvm_type(each) for each in signature.arguments]
+    kind = ir.FunctionType(_llvm_type(signature.result), arguments)
     function = ir.Function(module, kind, name)
     builder = ir.IRBuilder(function.append_basic_block())
     own = ir.Constant(_WORD, part)
@@ -102,14 +99,14 @@ def compile_counter() -> tuple[Any, Callable[[], int]]:
 
 
 def compile_clocked(
-    address: int, part: int, signature: Any, table: int, last: int
+    address: int, part: int, signature: Signature, table: int, last: int
 ) -> tuple[Any, int]:
     """Return the address of what counts, behind what must live as long.
 
     Parameters
     ----------
     address : int
-        Of the function that it calls, with `signature` in Numba's types.
+        Of the function that it calls.
     part : int
         Row of the table that it counts to.
     table : int

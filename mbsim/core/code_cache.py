@@ -1,6 +1,7 @@
 """Where compiled code is kept: the user's folder, and folders of code that was shipped.
 
-A root's code is stored under a digest of *all* project files that it can reach through imports:
+What is kept there is read by `core.machine_code`, without Numba, and by `core.function_cache`. A
+root's code is stored under a digest of *all* project files that it can reach through imports:
 Numba's own check sees only the file of the function itself, and would go on using an edited
 helper's old code. Numba's version, the link policy, Python's minor version, signature and processor
 are part of the key as well. A process whose files were changed after it began (an edit, an upgrade)
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import importlib.util
 import os
 import re
 import sys
@@ -22,17 +24,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import llvmlite.binding as llvm
-import numba
-from numba.core.caching import (
-    CompileResultCacheImpl,
-    FunctionCache,
-    IndexDataCacheFile,
-    _CacheLocator,
-)
-from numba.core.runtime import _nrt_python  # type: ignore[attr-defined]
-
-from mbsim.core import linking, processors, profile
+from mbsim.core import processors
 from mbsim.errors import ModelError
 
 _BEGAN = time.time()
@@ -41,8 +33,30 @@ _PACKAGE = str(PACKAGE)
 _IMPORT = re.compile(
     r"^\s*(?:from\s+(mbsim[\w.]*)\s+import\s+(\([^)]*\)|.+)|import\s+(mbsim[\w.]*))", re.M
 )
+#: Versions of Numba whose private methods are as `core.linking` takes them to be.
+TESTED = ("0.68.1",)
+
+
+def numba_version() -> str:
+    """Return the version of Numba; it is imported only if it does not say so in a file."""
+    if "numba" not in sys.modules:
+        found = importlib.util.find_spec("numba")
+        for folder in (found.submodule_search_locations or ()) if found is not None else ():
+            file = os.path.join(folder, "_version.py")
+            spec = importlib.util.spec_from_file_location("_numba_version", file)
+            if os.path.isfile(file) and spec is not None and spec.loader is not None:
+                module = importlib.util.module_from_spec(spec)
+                spec.loader.exec_module(module)
+                return str(module.get_versions()["version"])
+    import numba
+
+    return str(numba.__version__)
+
+
+#: Part of the name of the cache's folder: code of another policy is not mixed with it.
+POLICY = "roots4" if numba_version() in TESTED else "all"
 #: Below a folder of code: that of other versions and policies is not mixed with ours.
-_VERSION = f"{numba.__version__}-{linking.POLICY}"
+_VERSION = f"{numba_version()}-{POLICY}"
 
 
 def cache_root() -> Path:
@@ -69,7 +83,7 @@ on_unkept: Callable[[str], None] = _say_unkept
 _unkept: set[str] = set()
 
 
-def _note_unkept(folder: Path, error: OSError) -> None:
+def note_unkept(folder: Path, error: OSError) -> None:
     """Say once that a folder does not take compiled code; the run goes on."""
     if not _unkept:
         _unkept.add(str(folder))
@@ -95,7 +109,7 @@ def trusted_root() -> Path:
         root.parent.mkdir(parents=True, exist_ok=True)
         root.mkdir(mode=0o700, exist_ok=True)
     except OSError as error:
-        _note_unkept(root, error)
+        note_unkept(root, error)
     check_trusted(root)
     return root
 
@@ -181,7 +195,7 @@ def source_digest(files: list[Path]) -> str:
     return _digest(_reached(files))
 
 
-def _changed(file: str) -> bool:
+def changed(file: str) -> bool:
     """Return whether a file of the package was changed since this process began."""
     try:
         found = os.stat(file)
@@ -191,7 +205,7 @@ def _changed(file: str) -> bool:
     return ours and max(found.st_mtime, found.st_ctime) > _BEGAN
 
 
-_changed_once = functools.cache(_changed)
+_changed_once = functools.cache(changed)
 
 
 def is_known(function: Callable[..., Any]) -> bool:
@@ -200,121 +214,60 @@ def is_known(function: Callable[..., Any]) -> bool:
     return PACKAGE in file.parents or cache_root().resolve() in file.parents
 
 
-class _ContentLocator(_CacheLocator):
-    """A folder named by content."""
+class Sources:
+    """The files that a function's code follows from, and the folder of its code.
 
-    def __init__(self, files: list[Path]) -> None:
-        reached = _reached(files)
+    Parameters
+    ----------
+    py_func : callable
+    """
+
+    def __init__(self, py_func: Callable[..., Any]) -> None:
+        # an adapter closes over the law it adapts: that law's file counts as well
+        cells = [cell.cell_contents for cell in py_func.__closure__ or ()]
+        codes = [py_func.__code__, *(c.__code__ for c in cells if hasattr(c, "__code__"))]
+        reached = _reached([Path(code.co_filename) for code in codes])
         self.files = tuple(reached)
         self.digest = _digest(reached)
 
-    def get_cache_path(self) -> str:
-        return str(trusted_root() / _VERSION / self.digest)
+    @property
+    def folder(self) -> Path:
+        """The user's folder."""
+        return trusted_root() / _VERSION / self.digest
 
-    def ensure_cache_path(self) -> None:
-        path = Path(self.get_cache_path())
-        for folder in (path.parent, path):
-            folder.mkdir(mode=0o700, exist_ok=True)
-            check_trusted(folder)
+    def make_folder(self) -> Path:
+        """Return the user's folder, made for the user alone.
 
-    def get_source_stamp(self) -> str:
-        return "content"  # the folder's name already says it
-
-    def get_disambiguator(self) -> str:
-        return ""
-
-    @classmethod
-    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> _ContentLocator:
-        # an adapter closes over the law it adapts: that law's file counts as well
-        cells = [cell.cell_contents for cell in py_func.__closure__ or ()]
-        files = [Path(cell.__code__.co_filename) for cell in cells if hasattr(cell, "__code__")]
-        return cls([Path(py_file), *files])
-
-
-class _ByContent(CompileResultCacheImpl):
-    _locator_classes: Any = (_ContentLocator,)
-
-
-@functools.cache
-def _name_runtime() -> None:
-    """Name the functions that stored code may call: Numba does so where it compiles its own."""
-    for name, address in _nrt_python.c_helpers.items():
-        llvm.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
-
-
-class CodeCache(FunctionCache):
-    """Numba's cache of one function, in the user's folder and in shipped ones."""
-
-    _impl_class = _ByContent
-
-    def __init__(self, py_func: Callable[..., Any], on_miss: Callable[[str], None]) -> None:
-        super().__init__(py_func)  # type: ignore[no-untyped-call]
-        self._on_miss = on_miss
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return what is stored, without what only compiling needs: half a second of imports.
-
-        Stored code is complete but for Numba's reference counts; the compiler loads the rest
-        itself. A Numba that this was not tried with is asked as it asks itself.
+        Raises
+        ------
+        ModelError
+            If others could put code there.
         """
-        if numba.__version__ not in linking.TESTED:
-            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
-        _name_runtime()
-        with self._guard_against_spurious_io_errors():
-            return self._load_overload(sig, target_context)
+        folder = self.folder
+        for each in (folder.parent, folder):
+            each.mkdir(mode=0o700, exist_ok=True)
+            check_trusted(each)
+        return folder
 
-    def _load_overload(self, sig: Any, target_context: Any) -> Any:
-        with profile.part("load"):
-            return self._loaded(sig, target_context)
+    def checked_folder(self) -> Path:
+        """Return the user's folder, which need not be there; `ModelError` as of `make_folder`."""
+        folder = self.folder
+        for each in (folder.parent, folder):
+            check_trusted(each)
+        return folder
 
-    def _loaded(self, sig: Any, target_context: Any) -> Any:
-        key = self._index_key(sig, target_context.codegen())  # type: ignore[no-untyped-call]
-        files = self._impl.locator.files
-        data = None if any(map(_changed_once, files)) else self._find(key)
-        if data is None:
-            self._on_miss(self._py_func.__qualname__)
-            return None
-        return self._impl.rebuild(target_context, data)
-
-    def _save_overload(self, sig: Any, data: Any) -> None:
-        if any(map(_changed, self._impl.locator.files)):
-            return
-        try:
-            super()._save_overload(sig, data)  # type: ignore[no-untyped-call]
-        except OSError as error:  # a folder that cannot be written, or is full
-            _note_unkept(cache_root(), error)
-
-    def _find(self, key: Any) -> Any:
-        """Return what is stored of a root, None where nothing is."""
-        signature, (triple, *_), code = key
-        own = Path(self._impl.locator.get_cache_path())
-        for folder in (own.parent, own):
-            check_trusted(folder)
-        for file, family in [(self._cache_file, ""), *self._shipped()]:
-            wanted = key
-            if family:
-                wanted = signature, (triple, family, processors.features(family)), code
-            try:
-                data = file.load(wanted)
-            except OSError:  # a folder that cannot be read holds nothing
-                continue
-            if data is not None:
-                return data
-        return None
-
-    def _shipped(self) -> list[tuple[IndexDataCacheFile, str]]:
-        """Return this function's files in the folders of shipped code, and their families."""
-        locator, name = self._impl.locator, self._impl.filename_base
+    def shipped(self) -> list[tuple[Path, str]]:
+        """Return folders of shipped code of these files, and the family of each."""
         return [
-            (IndexDataCacheFile(str(path), name, locator.get_source_stamp()), family)
+            (path, family)
             for folder, family in shipped()
-            if (path := folder / locator.digest).is_dir()
+            if (path := folder / self.digest).is_dir()
         ]
 
-    def is_empty(self) -> bool:
-        """Return whether nothing is stored of this function, with any signature."""
-        files = [self._cache_file, *(file for file, _ in self._shipped())]
-        try:
-            return not any(file._load_index() for file in files)
-        except OSError:
-            return True
+    def changed(self) -> bool:
+        """Return whether a file was changed since this process began, asked once a file."""
+        return any(map(_changed_once, self.files))
+
+    def changed_by_now(self) -> bool:
+        """Return whether a file was changed since this process began."""
+        return any(map(changed, self.files))

@@ -7,25 +7,18 @@ Two ways into compiled code, and only these:
   scene chooses (laws, pairs) and for what an integrator calls without knowing it.
 
 Everything these call is a plain function marked `jitable`. `core.code_cache` keeps the result.
+A process that finds all its C functions there does not import Numba: `core.compiling` does.
 """
 
 from __future__ import annotations
 
 import functools
-import gc
 import time
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-import numba
-from numba.core import event, sigutils
-from numba.core.ccallback import CFunc
-from numba.extending import register_jitable
-
-import mbsim.core.address  # noqa: F401  (compiled forms of core.memory)
-from mbsim.core import linking, profile
-from mbsim.core.code_cache import CodeCache, cache_root, is_known, source_digest
-from mbsim.core.jitable import take_marked
+from mbsim.core import machine_code, profile
+from mbsim.core.code_cache import cache_root, is_known, source_digest
 
 __all__ = ["address", "cache_root", "function", "planned", "source_digest"]
 
@@ -45,56 +38,12 @@ _missing: list[str] | None = None  # names, while roots are counted
 _planning = False
 
 
-_installed = False
-
-
-def _register() -> None:
-    """Tell Numba of the functions marked since the last compilation: what is loaded needs none."""
-    global _installed
-    if not _installed:
-        linking.install()
-        _installed = True
-    for function in take_marked():
-        register_jitable(error_model="numpy", no_cfunc_wrapper=True)(function)
-
-
-class _Watch(event.Listener):
-    """Counts the time that Numba compiles (loading from the cache is not compiling)."""
-
-    def __init__(self) -> None:
-        self._depth = 0
-        self._began = 0.0
-        self._collects = False
-        self._counts: profile.Profile | None = None
-
-    def on_start(self, happened: Any) -> None:
-        global on_first_compile
-        if self._depth == 0:
-            self._began = time.perf_counter()
-            self._counts = profile.running
-            if self._counts is not None:
-                self._counts.enter("compile")
-            self._collects = gc.isenabled()
-            gc.disable()  # the compiler's million small objects are looked through again and again
-            if on_first_compile is not None:
-                tell, on_first_compile = on_first_compile, None
-                tell()
-        self._depth += 1
-
-    def on_end(self, happened: Any) -> None:
-        global compile_seconds
-        self._depth -= 1
-        if self._depth == 0:
-            if self._collects:
-                gc.enable()
-            compile_seconds += time.perf_counter() - self._began
-            if self._counts is not None:
-                self._counts.leave()
-
-
-_watch = _Watch()
-event.register("numba:run_pass", _watch)
-event.register("numba:compile", _watch)  # around the passes, and what Python calls is linked there
+def tell_of_first() -> None:
+    """Tell that something is compiled, once."""
+    global on_first_compile
+    if on_first_compile is not None:
+        tell, on_first_compile = on_first_compile, None
+        tell()
 
 
 class _NotKeptError(Exception):
@@ -107,7 +56,6 @@ def _about_to_compile(name: str) -> None:
     if _missing is not None:
         _missing.append(name)
         raise _NotKeptError
-    _register()
     total += 1
     compiled += 1
     expected = max(expected, compiled)
@@ -146,22 +94,13 @@ def function(py_func: Callable[..., Any], allocates: bool = True) -> Callable[..
     is not cached: Numba would keep it while the arrays that it looks at change. What `allocates` no
     arrays need not count who uses which: that costs a call for each that is passed on.
     """
-    linking.install_library()
-    options: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": allocates}
-    made: Any = numba.njit(**options)(py_func)
-    if is_known(py_func):
-        made._cache = CodeCache(py_func, _about_to_compile)
-    else:
-        _register()
-    return cast(Callable[..., Any], made)
+    from mbsim.core import compiling
 
+    def on_miss(name: str) -> None:
+        _about_to_compile(name)
+        compiling.register()
 
-def awaited(py_func: Callable[..., Any], allocates: bool = True) -> Callable[..., Any]:
-    """Return `function(py_func)`, counted (`planned`) as what is called soon."""
-    made: Any = function(py_func, allocates)
-    if _missing is not None and isinstance(made._cache, CodeCache):
-        if not made.overloads and made._cache.is_empty():
-            _missing.append(py_func.__qualname__)
+    made = compiling.dispatcher(py_func, allocates, on_miss if is_known(py_func) else None)
     return cast(Callable[..., Any], made)
 
 
@@ -184,8 +123,8 @@ def _note(key: tuple[Any, Any], address: int) -> int:
 def address(py_func: Callable[..., Any], signature: Any, allocates: bool = False) -> int:
     """Return the address of `py_func` compiled as a C function; it lives as long as the process.
 
-    As with `function`, what stands elsewhere is not cached, and only what `allocates` may make
-    arrays, as users' functions may.
+    `signature` is a `core.signature.Signature`. As with `function`, what stands elsewhere is not
+    cached, and only what `allocates` may make arrays, as users' functions may.
     """
     global compile_seconds
     if (known := _known.get((py_func, id(signature)))) is not None:
@@ -193,22 +132,28 @@ def address(py_func: Callable[..., Any], signature: Any, allocates: bool = False
     key = py_func, signature
     if key in _kept:
         return _note(key, int(_kept[key].address))
-    linking.install_library()
-    typed = sigutils.normalize_signature(signature)
-    made: Any = CFunc(py_func, typed, {}, {"error_model": "numpy", "_nrt": allocates})
+    place = None
     if is_known(py_func):
-        made._cache = CodeCache(py_func, _about_to_compile)
-    else:
-        _register()
-    before, counted, began = total, compile_seconds, time.perf_counter()
-    try:
-        with profile.part("compile"):  # loading counts as such
-            made.compile()
-    except _NotKeptError:
-        return NOT_YET
-    if total > before:
-        # what Numba and the linker do between the passes is compiling as well
-        compile_seconds = counted + time.perf_counter() - began
+        with profile.part("load"):
+            place = machine_code.Place(py_func, signature, allocates)
+            code = place.find()
+            loaded = machine_code.load(code) if code is not None else None
+        if loaded is not None:
+            _kept[key] = loaded
+            return _note(key, loaded.address)
+        try:
+            _about_to_compile(py_func.__qualname__)
+        except _NotKeptError:
+            return NOT_YET
+    from mbsim.core import compiling
+
+    before, began = compile_seconds, time.perf_counter()
+    with profile.part("compile"):
+        made = compiling.c_function(py_func, signature, allocates)
+        if place is not None:
+            place.keep(compiling.code_of(made))
+    # what Numba and the linker do between the passes is compiling as well
+    compile_seconds = before + time.perf_counter() - began
     _kept[key] = made
     return _note(key, int(made.address))
 

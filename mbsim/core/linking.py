@@ -16,15 +16,10 @@ from collections.abc import Iterator
 from typing import Any
 
 import llvmlite.binding as llvm
-import numba
 from numba.core import codegen, environment
 from numba.core.registry import cpu_target
 
-#: Versions of Numba whose private methods are as this module takes them to be.
-TESTED = ("0.68.1",)
-
-#: Part of the name of the cache's folder: code of another policy is not mixed with it.
-POLICY = "roots4" if numba.__version__ in TESTED else "all"
+from mbsim.core.code_cache import POLICY
 
 _ENVIRONMENT = "_ZN08NumbaEnv"
 _RECURSIVE = codegen.RuntimeLinker.PREFIX
@@ -83,6 +78,7 @@ class RootLibrary(codegen.JITCodeLibrary):
             if not function.is_declaration and function.name not in own:
                 function.linkage = llvm.Linkage.internal
         self._optimize_final_module()  # type: ignore[no-untyped-call]
+        self._leave_out_errors()
         self._final_module.verify()
         self._finalize_final_module()  # type: ignore[no-untyped-call]
         codegen: Any = self._codegen
@@ -91,6 +87,18 @@ class RootLibrary(codegen.JITCodeLibrary):
                 found = environment.lookup_environment(variable.name)
                 if found is not None:
                     codegen.set_env(variable.name, found)
+
+    def _leave_out_errors(self) -> None:
+        """Leave out what handles errors of functions that were found to raise none.
+
+        That follows from their code as it is once optimised; their callers were optimised before.
+        """
+        codegen: Any = self._codegen
+        passes = llvm.create_new_module_pass_manager()
+        passes.add_ipsccp_pass()
+        passes.add_simplify_cfg_pass()
+        passes.add_global_dead_code_eliminate_pass()
+        passes.run(self._final_module, codegen._pass_builder())
 
     def _resolve_recursion(self) -> None:
         """Let calls of functions that call each other go straight, now that all are here."""
@@ -174,10 +182,11 @@ def install() -> None:
     if POLICY == "all":
         return
     install_library()
-    from mbsim.core import numba_costs, plain_code
+    from mbsim.core import numba_costs, plain_code, plain_math
 
     numba_costs.install()
     plain_code.install()
+    plain_math.install()
 
 
 def install_library() -> None:

@@ -107,11 +107,10 @@ from collections.abc import Callable, Container, Mapping
 from enum import IntEnum
 from typing import Any, NamedTuple
 
-from numba import types
+from mbsim.core.signature import FLOAT, INT, POINTER
 
-_PTR = types.CPointer(types.float64)
-HOOK = types.int64(types.int64, types.float64, types.float64, _PTR, _PTR)
-MEASURE = types.float64(types.int64, types.float64, types.float64, _PTR, _PTR)
+HOOK = INT(INT, FLOAT, FLOAT, POINTER, POINTER)
+MEASURE = FLOAT(INT, FLOAT, FLOAT, POINTER, POINTER)
 #: The hooks that measure.
 MEASURES = frozenset({"norm", "check", "inner", "limit", "stable"})
 #: The hooks that make arrays as long as what they find.

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import functools
-from typing import Any
+import os
 
-from numba.core import config as _declared
-from numba.core.codegen import get_host_cpu_features
+import llvmlite.binding as llvm
 
 from mbsim.errors import ModelError
 
-_config: Any = _declared  # Numba fills it when it is imported
+#: Variables by which Numba is told to compile for another processor.
+_SETTINGS = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_ENABLE_AVX")
 
 _V2 = ("cx16", "popcnt", "sahf", "sse3", "sse4.1", "sse4.2", "ssse3")
 _V3 = (*_V2, "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "xsave")
@@ -32,13 +32,36 @@ def features(family: str) -> str:
     return ",".join(f"+{name}" for name in FAMILIES[family])
 
 
+def get_host_cpu_features() -> str:
+    """Return the features of this processor as LLVM names them, empty where it does not know."""
+    try:
+        return str(llvm.get_host_cpu_features().flatten())
+    except RuntimeError:
+        return ""
+
+
+def here() -> str:
+    """Return what code that is compiled in this process is for, as a text."""
+    name, features, avx = (os.environ.get(setting) for setting in _SETTINGS)
+    if name is None:
+        name = llvm.get_host_cpu_name()
+    if features is None:
+        features = get_host_cpu_features() + ("" if avx is None else f" {avx}")
+    return f"{llvm.get_process_triple()} {name} {features}"
+
+
+def of_family(family: str) -> str:
+    """Return the same of code for a family."""
+    return f"{llvm.get_process_triple()} {family} {features(family)}"
+
+
 @functools.cache
 def runnable() -> tuple[str, ...]:
     """Return the families whose code this machine runs, the best first.
 
     None where NUMBA_CPU_NAME or NUMBA_CPU_FEATURES asks for code of a certain processor.
     """
-    if _config.CPU_NAME is not None or _config.CPU_FEATURES is not None:
+    if any(setting in os.environ for setting in _SETTINGS[:2]):
         return ()
     here = set(get_host_cpu_features().split(","))
     return tuple(
@@ -48,7 +71,13 @@ def runnable() -> tuple[str, ...]:
 
 def folder_of(family: str) -> str:
     """Return the folder's name for a family's code, which may call Intel's SVML where that is."""
-    return f"{family}-svml" if _config.USING_SVML else family
+    if not llvm.targets.has_svml():
+        return family
+    # whether the library is there as well Numba finds out
+    from numba.core import config
+
+    using: bool = vars(config)["USING_SVML"]
+    return f"{family}-svml" if using else family
 
 
 def settings(family: str) -> dict[str, str]:

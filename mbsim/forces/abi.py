@@ -21,22 +21,16 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from numba import types
-from numba.extending import overload
-
 from mbsim.core import jit
 from mbsim.core.address import call_int, table_at, vector_at
 from mbsim.core.arrays import F1, V2, V3, Pointer
-from mbsim.core.jitable import jitable
+from mbsim.core.jitable import compiled_form, jitable
+from mbsim.core.signature import FLOAT, INT, POINTER
 from mbsim.forces.catalog import FORCES, Switched, Wrench
 from mbsim.forces.formula import Asked, Kept, Motion, ask
 
-_POINTER = types.CPointer(types.float64)
-SIGNATURE = types.int64(_POINTER, _POINTER, _POINTER)
-SCALAR_SIGNATURE = types.int64(
-    *(types.int64, types.float64, types.float64, _POINTER, _POINTER),
-    *(types.int64, _POINTER, _POINTER, _POINTER),
-)
+SIGNATURE = INT(POINTER, POINTER, POINTER)
+SCALAR_SIGNATURE = INT(INT, FLOAT, FLOAT, POINTER, POINTER, INT, POINTER, POINTER, POINTER)
 #: Slopes that have not been compiled yet, by the address of their wrench.
 _SLOPES: dict[int, Any] = {}
 
@@ -47,7 +41,7 @@ def motion_in(a: F1) -> Motion:
     return Motion((a[0], a[1], a[2]), (a[3], a[4], a[5]), (a[6], a[7], a[8]), (a[9], a[10], a[11]))
 
 
-@overload(ask)
+@compiled_form(ask)
 def _ask(law: Any, depth: Any, rate: Any) -> Any:
     """Give compiled code its form of `ask`, where a law is address, constants and room."""
 

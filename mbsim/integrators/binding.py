@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from mbsim.core import jit
-from mbsim.core.address import pack
+from mbsim.core.address import pack, vector_at
+from mbsim.core.arrays import F1, Pointer
 from mbsim.core.problem import HOOK, Problem
-from mbsim.integrators import branches, changing, events, rates
+from mbsim.core.signature import FLOAT, INT, POINTER
+from mbsim.integrators import branches, changing, driver, events, rates
 from mbsim.integrators.scheme import WATCH, Method, Scheme, Steps, Workspace
 
 
@@ -32,3 +35,55 @@ def bind(
     rate = jit.address(rates.serve, rates.ASKED) if changes else 0
     steps = Steps(context, attempt, fit_dense, *numbers, looks, locates, probes, calm, rate)
     return steps, (table, workspace)
+
+
+def advance(
+    context: int,
+    attempt: int,
+    fit_dense: int,
+    last: int,
+    order: float,
+    memory: float,
+    implicit: int,
+    resumes: float,
+    branches: int,
+    events: int,
+    probe: int,
+    calm: int,
+    rate: int,
+    t_end: float,
+    tol: float,
+    h_max: float,
+    h_min: float,
+    times: Pointer,
+    count: int,
+    budget: int,
+) -> int:
+    """Advance as `driver.advance` does.
+
+    Many arguments because a C function takes the fields of `Steps` one by one.
+    """
+    steps = Steps(
+        *(context, attempt, fit_dense, last, order, memory, implicit != 0, resumes),
+        *(branches, events, probe, calm, rate),
+    )
+    return driver.advance(steps, t_end, tol, h_max, h_min, vector_at(times, count), budget)
+
+
+_ADVANCE = INT(
+    *(INT, INT, INT, INT, FLOAT, FLOAT, INT, FLOAT, INT, INT, INT, INT, INT),
+    *(FLOAT, FLOAT, FLOAT, FLOAT, POINTER, INT, INT),
+)
+
+
+def advancing() -> Callable[..., int]:
+    """Return `driver.advance` compiled, with its arguments; it runs without Python's lock."""
+    compiled = _ADVANCE.at(jit.address(advance, _ADVANCE))
+
+    def advance_to(
+        steps: Steps, t_end: float, tol: float, h_max: float, h_min: float, times: F1, budget: int
+    ) -> int:
+        given = (t_end, tol, h_max, h_min, times.ctypes.data, len(times), budget)
+        return int(compiled(*steps, *given))
+
+    return advance_to

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import math
 
-from numba import types
-
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
@@ -26,6 +24,7 @@ from mbsim.core.problem import (
     SETTLE,
     Problem,
 )
+from mbsim.core.signature import FLOAT, INT
 from mbsim.integrators.scheme import (
     AT_ONCE,
     HOLDS,
@@ -43,7 +42,7 @@ from mbsim.integrators.scheme import (
 )
 
 #: Of `serve`: context, what is asked, time and step, and of FIRST how long that was meant to be.
-ASKED = types.float64(types.int64, types.int64, types.float64, types.float64, types.float64)
+ASKED = FLOAT(INT, INT, FLOAT, FLOAT, FLOAT)
 #: A step begins where nothing is known; one was tried, is fitted, may be cut; one was taken.
 BEGIN, TRIED, FITTED, FIRST, TAKEN = range(5)
 #: What is looked for within a step (`LOOKS`): sides that change twice, ways that bend.

@@ -33,11 +33,10 @@ from __future__ import annotations
 
 import math
 
-from numba import types
-
 from mbsim.core.address import call_float, call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import Problem
+from mbsim.core.signature import FLOAT, INT
 from mbsim.integrators.rates import largest_rate
 from mbsim.integrators.scheme import (
     BEGUN,
@@ -73,7 +72,7 @@ from mbsim.integrators.scheme import (
 from mbsim.integrators.stability import BOUND, WITHIN, keep_to_bound, note_bound, stay_within
 
 #: Of `serve`: context, `attempt` of the explicit method, end of the run.
-ASKED = types.int64(types.int64, types.int64, types.float64)
+ASKED = INT(INT, INT, FLOAT)
 #: A step that is shorter than this part of one that was stiff is for what that has thrown.
 THROWS = 0.1
 #: Steps found stiff one after the other from which on none goes beyond the bound: a kink is one.

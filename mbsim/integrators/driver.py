@@ -466,6 +466,7 @@ def go_on(  # noqa: C901
     return DONE
 
 
+@jitable
 def advance(
     steps: Steps, t_end: float, tol: float, h_max: float, h_min: float, times: F1, budget: int
 ) -> int:

@@ -6,26 +6,18 @@ nothing of it.
 
 from __future__ import annotations
 
-from numba import types
-
 from mbsim.core.address import call_int, vector_at
 from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import Problem
+from mbsim.core.signature import FLOAT, INT, POINTER
 from mbsim.integrators.scheme import NEXT_OUTPUT, Method, answer_of, in_workspace, interpolate
 
 #: A step is looked into for events at so many points, and at one more for each row within it,
 #: up to so many.
 LOOKS, MOST_LOOKS = 4, 64
 #: Of `serve`: context, what is asked, time and step, the output times and their number.
-ASKED = types.float64(
-    types.int64,
-    types.int64,
-    types.float64,
-    types.float64,
-    types.CPointer(types.float64),
-    types.int64,
-)
+ASKED = FLOAT(INT, INT, FLOAT, FLOAT, POINTER, INT)
 #: The length up to the first event; to be evaluated at the trial point again.
 FIRST, AT_END = range(2)
 

@@ -10,11 +10,10 @@ from __future__ import annotations
 
 import math
 
-from numba import types
-
 from mbsim.core.address import call_float, call_int
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import EACH, POSITION, RATES, Problem
+from mbsim.core.signature import FLOAT, INT
 from mbsim.integrators.scheme import (
     EVALUATIONS,
     OWN_TIME,
@@ -27,7 +26,7 @@ from mbsim.integrators.scheme import (
 from mbsim.integrators.stability import DIFFERENCES, rate_of
 
 #: Of `serve`: context, time.
-ASKED = types.float64(types.int64, types.float64)
+ASKED = FLOAT(INT, FLOAT)
 #: How far the state is moved, of the tolerance, and at least: far above rounding.
 MOVED, LEAST = 1e-2, 1e-9
 #: How often; the last two count, for a vibration may be in its middle at one of them.

@@ -18,13 +18,12 @@ import functools
 from collections.abc import Callable
 from typing import Any
 
-from numba import types
-
 from mbsim.core import jit
 from mbsim.core.address import as_tuple, vector_at
 from mbsim.core.arrays import F1, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import vector
+from mbsim.core.signature import FLOAT, INT, POINTER
 from mbsim.laws.catalog import FrictionInput, FrictionLaw, NormalLaw
 
 #: Results of a normal law.
@@ -41,9 +40,8 @@ NORMAL_RATE, LIMIT_RATE, STIFFNESS_RATE = range(25, FRICTION_INPUTS)
 FORCE_X_OUT, FORCE_Y_OUT, TORQUE_X_OUT, TORQUE_Y_OUT, TORQUE_Z_OUT = range(5)
 STORED_OUT, MODE_OUT, BRANCH_OUT, SIZE_OUT, UNIT_OUT, MEMORY_OUT = range(5, 11)
 
-_PTR = types.CPointer(types.float64)
-NORMAL_SIGNATURE = types.int64(types.float64, types.float64, _PTR, _PTR)
-FRICTION_SIGNATURE = types.int64(types.int64, _PTR, _PTR, _PTR)
+NORMAL_SIGNATURE = INT(FLOAT, FLOAT, POINTER, POINTER)
+FRICTION_SIGNATURE = INT(INT, POINTER, POINTER, POINTER)
 
 
 @jitable

@@ -53,7 +53,8 @@ class Runner:
         from mbsim.arrays.codes import AUDIT_TOL
         from mbsim.compile_model.timetable import follows_time
         from mbsim.core import jit
-        from mbsim.integrators import driver, scheme
+        from mbsim.integrators import scheme
+        from mbsim.integrators.binding import advancing
         from mbsim.run.methods import Methods
         from mbsim.run.sensing import Sensing
 
@@ -65,7 +66,7 @@ class Runner:
         timed = follows_time(system.scene)
         self._advance, self.methods = jit.planned(
             lambda: (
-                jit.awaited(driver.advance, allocates=False),
+                advancing(),
                 Methods(system, settings.integrator, start, timed, settings.fixed, settings.tol),
             )
         )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numba import types
 
 from mbsim.arrays.codes import MULTI_POINT, OF_POINTS, POINTS, SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.hooks import Hook
@@ -14,6 +13,7 @@ from mbsim.compile_model.tangent import MOST_BODIES
 from mbsim.core import jit
 from mbsim.core.address import pack
 from mbsim.core.problem import Problem, addresses
+from mbsim.core.signature import FLOAT, INT, POINTER
 from mbsim.dynamics.linearization.stiffness import sides_of
 from mbsim.errors import ModelError
 from mbsim.geometry.catalog import NEARS, PAIRS, REGION_ROWS
@@ -56,8 +56,7 @@ if TYPE_CHECKING:
     from mbsim.core.arrays import I1 as Indices
     from mbsim.core.arrays import I2 as Table
 
-_INT, _T, _PTR = types.int64, types.float64, types.CPointer(types.float64)
-_CONTACTS = _INT(_INT, _INT, _T, _T, _PTR, _PTR)
+_CONTACTS = INT(INT, INT, FLOAT, FLOAT, POINTER, POINTER)
 #: Hooks of compliant contact, which rigid contact has no use for.
 COMPLIANT = frozenset(
     {
@@ -304,7 +303,7 @@ def rigid_mechanism(system: System, fixed: bool, tol: float) -> Made:
     if len(scene.contacts.id) > 0:
         scene.world.hooks[Hook.CONTACTS] = jit.address(own.serve_contacts, _CONTACTS)
     if len(scene.broadphase.contact) > 0:
-        scene.world.hooks[Hook.NEAR] = jit.address(list_near, _INT(_INT, _PTR))
+        scene.world.hooks[Hook.NEAR] = jit.address(list_near, INT(INT, POINTER))
     fill(scene, only=set(Hook) - COMPLIANT - OWN)
     hooks = {**shared.HOOKS, **own.HOOKS}
     if len(scene.sensors.id) > 0:

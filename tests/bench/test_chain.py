@@ -16,10 +16,9 @@ from mbsim.bench import parameters as p
 from mbsim.bench import report
 from mbsim.bench.scenes.s01_top import rotations
 from mbsim.bench.scenes.s08_linkages import chain_deck
-from mbsim.core import jit
 from mbsim.core.problem import DONE
-from mbsim.integrators import catalog, driver, scheme
-from mbsim.integrators.binding import bind
+from mbsim.integrators import catalog, scheme
+from mbsim.integrators.binding import advancing, bind
 
 pytestmark = pytest.mark.bench
 
@@ -80,7 +79,7 @@ def of_joints(integrator, tol, tilt):
     problem, _table = joint_chain.problem(chain)
     state = scheme.make(method, np.zeros(2 * RODS), 0.0)
     steps, _bench = bind(method, problem, state)
-    advance = jit.function(driver.advance)
+    advance = advancing()
     assert advance(steps, TIMES[-1], tol, math.inf, 0.0, TIMES[1:], 10**8) == DONE
     start = [p.S8.length, 0.0, 0.0]
     return np.vstack([start, chain.rows]), state.counts[scheme.EVALUATIONS]

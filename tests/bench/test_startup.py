@@ -16,49 +16,57 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from numba import njit, types
+from numba import njit
 
 import mbsim
 from mbsim.core import jit
 from mbsim.core.address import call_float, pack, view
 from mbsim.core.arrays import F1, F2
+from mbsim.core.signature import FLOAT, INT, POINTER
 
 pytestmark = pytest.mark.bench
 PACKAGE = Path(mbsim.__file__).resolve().parent
-RUN = (
-    "import mbsim; r = mbsim.simulate(mbsim.read_model({deck!r})); "
-    "print(r.stats['wall_s'], r.stats['compile_s'])"
-)
+#: Starts of a command of which the least counts.
+STARTS = 5
+
+
+def seconds(folder, environment, *command):
+    """Return the processor time of a command of the `mbsim` in a folder."""
+    before = os.times()
+    subprocess.run(
+        [sys.executable, "-m", "mbsim", *map(str, command)],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        check=True,
+    )
+    now = os.times()
+    spent = now.children_user + now.children_system
+    return spent - before.children_user - before.children_system
 
 
 def test_cold_warm_and_after_editing_one_law(tmp_path):
     shutil.copytree(PACKAGE, tmp_path / "mbsim")
     deck = PACKAGE.parent / "models/drop_m.xml"
     law = tmp_path / "mbsim/laws/friction/coulomb.py"
-    environment = {
-        **os.environ,
-        "PYTHONPATH": str(tmp_path),
-        "MBSIM_CACHE_DIR": str(tmp_path / "cache"),
-    }
-    print()
-    for name in ("cold", "warm", "after editing one law", "warm"):
-        if name.startswith("after"):
-            law.write_text(law.read_text() + "\n# edited\n")
-        began = time.perf_counter()
-        done = subprocess.run(
-            [sys.executable, "-c", RUN.format(deck=str(deck))],
-            cwd=tmp_path,
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=True,
+    environment = {**os.environ, "MBSIM_CACHE_DIR": str(tmp_path / "cache")}
+    for name in ("PYTHONDONTWRITEBYTECODE", "PYTHONPYCACHEPREFIX"):
+        environment.pop(name, None)
+    # whether Python keeps the bytecode of modules counts for as much as all else
+    keeps = {**environment, "PYTHONPYCACHEPREFIX": str(tmp_path / "bytecode")}
+    refuses = {**environment, "PYTHONDONTWRITEBYTECODE": "1"}
+    run, check = ("run", deck, "-o", tmp_path), ("check", deck)
+    cold = seconds(tmp_path, keeps, *run)
+    print(f"\ncold: {cold:.1f} s")
+    seconds(tmp_path, keeps, *check)
+    for name, command in (("run", run), ("check", check)):
+        kept, unkept = (
+            min(seconds(tmp_path, its, *command) for _ in range(STARTS)) for its in (keeps, refuses)
         )
-        whole = time.perf_counter() - began
-        wall, compiling = map(float, done.stdout.split())
-        print(
-            f"{name}: {whole:.2f} s in all, {wall:.2f} s of it the run, {compiling:.2f} s compiling"
-        )
-        assert compiling < whole
+        print(f"{name}, warm: {kept:.2f} s; where no bytecode is kept {unkept:.2f} s")
+        assert kept < cold
+    law.write_text(law.read_text() + "\n# edited\n")
+    print(f"after editing one law: {seconds(tmp_path, keeps, *run):.1f} s")
 
 
 class Ten(NamedTuple):
@@ -101,9 +109,7 @@ def test_a_call_by_address():
 
     group = Fifty(*[ten() for _ in range(5)])
     table = pack(group)
-    pointer = types.CPointer(types.float64)
-    signature = types.float64(types.int64, types.float64, types.float64, pointer, pointer)
-    address = jit.address(_by_address, signature)
+    address = jit.address(_by_address, FLOAT(INT, FLOAT, FLOAT, POINTER, POINTER))
     x, count = np.zeros(1), 2_000_000
     _loop_address(address, table.ctypes.data, x, 10)
     times = []

@@ -7,7 +7,6 @@ import math
 
 import numpy as np
 import pytest
-from numba import types
 
 import mbsim
 from helpers import mechanism_decks, pile_decks
@@ -144,12 +143,6 @@ def model_of(deck, folder):
     return mbsim.read_model(path if path.is_file() else CORPUS / path.name)
 
 
-def c_type(kind):
-    """Return the type that `ctypes` has for one of a signature."""
-    plain = {types.int64: ctypes.c_int64, types.float64: ctypes.c_double}
-    return plain.get(kind, ctypes.c_void_p)
-
-
 class Failure:
     """A hook that returns its code from some call on, or for one request, as else the hook does."""
 
@@ -162,8 +155,7 @@ class Failure:
         if address in (0, jit.NOT_YET) or self.kept:
             return
         signature = SIGNATURES[self.hook]
-        form = ctypes.CFUNCTYPE(c_type(signature.return_type), *map(c_type, signature.args))
-        own = form(address)
+        form, own = signature.form, signature.at(address)
 
         def serve(*given):
             if self.request is Joints.PROJECT_TREE:

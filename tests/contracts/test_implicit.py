@@ -11,7 +11,6 @@ import pytest
 from numba import carray
 
 from helpers.equations import far, none, observed, one, oscillation, zero
-from mbsim.core import jit
 from mbsim.core.address import pack, view
 from mbsim.core.arrays import F1, F2, I1
 from mbsim.core.codes import Code
@@ -31,14 +30,13 @@ from mbsim.dynamics.bodies import configuration
 from mbsim.integrators import (
     catalog,
     control,
-    driver,
     galpha,
     galpha_iteration,
     newton,
     radau5,
     scheme,
 )
-from mbsim.integrators.binding import bind
+from mbsim.integrators.binding import advancing, bind
 
 RELAX, VAN_DER_POL, ROBERTSON, OSCILLATOR, DECAY, BLOWS_UP, HALF_LINE = range(7)
 #: A body of mass 1 on a spring and a damper, driven, with a state z that follows it; a top whose
@@ -383,7 +381,7 @@ class Run:
         self.steps, self._kept = bind(method, self.problem, self.state)
 
     def __call__(self, end, tol, h_max=math.inf, budget=10**8, times=()):
-        advance = jit.function(driver.advance)
+        advance = advancing()
         times = np.array(times, dtype=float)
         return advance(self.steps, end, tol, h_max, 0.0, times, budget)
 
@@ -676,7 +674,7 @@ def test_radau5_agrees_with_an_explicit_method(exact_motions, motion):
     other = catalog.load("DOP853")
     state = scheme.make(other, y0, 0.0)
     steps, _kept = bind(other, run.problem, state)
-    advance = jit.function(driver.advance)
+    advance = advancing()
     assert advance(steps, 2.0, 1e-13, math.inf, 0.0, np.zeros(0), 10**8) == DONE
     np.testing.assert_allclose(exact_motions[motion][0], state.y, rtol=0, atol=1e-10)
 

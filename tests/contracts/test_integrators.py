@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from numba import carray, cfunc
+from numba import carray
 
 import mbsim
 from helpers.decks import run_model
@@ -19,8 +19,8 @@ from mbsim.core import jit
 from mbsim.core.address import call_int, pack, view
 from mbsim.core.arrays import F1, F2, I1
 from mbsim.core.problem import DONE, FAILED, HOOK, PAUSED, STEP_TOO_SMALL, Problem, addresses
-from mbsim.integrators import catalog, dop853, driver, scheme
-from mbsim.integrators.binding import bind
+from mbsim.integrators import catalog, dop853, scheme
+from mbsim.integrators.binding import advancing, bind
 
 
 def is_explicit(method):
@@ -213,7 +213,7 @@ class Run:
         self.steps, self._kept = bind(method, problem, self.state)
 
     def __call__(self, end, tol, h_max=math.inf, budget=10**8, times=()):
-        advance = jit.function(driver.advance)
+        advance = advancing()
         times = np.array(times, dtype=float)
         return advance(self.steps, end, tol, h_max, 0.0, times, budget)
 
@@ -479,16 +479,13 @@ def _cubic(context, t, h, a, b):
 
 def test_the_driver_serves_a_method_without_an_error_estimate(oscillator):
     errors = []
-    # not cached: Numba would not see a change in scheme.py
-    attempt, cubic = (cfunc(HOOK, error_model="numpy")(f) for f in (_verlet, _cubic))
+    attempt, cubic = (jit.address(f, HOOK) for f in (_verlet, _cubic))
     for n in (100, 200):
         run = Run("DOPRI5", oscillator)
         method = scheme.Scheme(_verlet, _cubic, stages=2, last=1, dense=4, order=0.0)
         run.state = scheme.make(method, np.array([1.0, 0.0]), 0.0)
         bound, run.kept = bind(catalog.load("DOPRI5"), oscillator, run.state)
-        run.steps = bound._replace(
-            attempt=attempt.address, fit_dense=cubic.address, last=1, order=0.0
-        )
+        run.steps = bound._replace(attempt=attempt, fit_dense=cubic, last=1, order=0.0)
         assert run(5.0, 1e-5, h_max=5.0 / n, times=[0.33, 4.9]) == DONE
         assert run.state.counts[scheme.STEPS] == n
         assert run.state.counts[scheme.EVALUATIONS] == n + 1

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numba import njit
 
-from mbsim.core import jit, linking
+from mbsim.core import compiling, linking
 
-jit._register()
+compiling.register()
 pytestmark = pytest.mark.skipif(linking.POLICY == "all", reason="Numba's own linking")
 
 KINDS = (np.float64, np.int64, np.bool_, np.complex128, np.uint8, np.float32)

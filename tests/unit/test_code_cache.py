@@ -60,8 +60,8 @@ def test_it_is_made_for_the_user_alone(root: Path) -> None:
     before = os.umask(0)
     try:
         assert code_cache.trusted_root() == root
-        locator = code_cache._ContentLocator([Path(__file__)])
-        locator.ensure_cache_path()
+        sources = code_cache.Sources(double)
+        sources.make_folder()
     finally:
         os.umask(before)
     for folder in (root, *root.rglob("*")):
@@ -77,11 +77,11 @@ def test_one_that_others_can_write_is_refused(root: Path, bits: int) -> None:
 
 
 def test_a_folder_within_that_others_can_write_is_refused(root: Path) -> None:
-    locator = code_cache._ContentLocator([Path(__file__)])
-    locator.ensure_cache_path()
-    Path(locator.get_cache_path()).chmod(0o770)
+    sources = code_cache.Sources(double)
+    sources.make_folder()
+    sources.folder.chmod(0o770)
     with pytest.raises(ModelError, match="can be written by others"):
-        locator.ensure_cache_path()
+        sources.make_folder()
 
 
 @pytest.mark.skipif(

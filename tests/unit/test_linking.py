@@ -22,9 +22,10 @@ from numba.core.runtime import _nrt_python, rtsys
 from numba.core.types import Array, Tuple
 
 from helpers.folders import MODELS, PACKAGES
-from mbsim.core import jit, linking, numba_costs
+from mbsim.core import compiling, jit, linking, numba_costs
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
+from mbsim.core.signature import FLOAT, INT
 
 pytestmark = pytest.mark.skipif(linking.POLICY == "all", reason="Numba's own linking")
 
@@ -75,10 +76,10 @@ RUN = """
 import ctypes, pathlib, sys
 {before}
 from mbsim.core import jit, linking
-from numba import float64, int64
+from mbsim.core.signature import FLOAT, INT
 import helpers
 found = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_int64, ctypes.c_double)(
-    jit.address(helpers.root, float64(int64, float64))
+    jit.address(helpers.root, FLOAT(INT, FLOAT))
 )
 called = jit.function(helpers.checked)
 try:
@@ -138,7 +139,7 @@ def stored(x):
 
 
 def test_a_stored_function_is_linked_into_another_root():
-    jit._register()
+    compiling.register()
     codegen = cpu_target.target_context.codegen()
     compiled = njit(stored)
     assert compiled(2.0) == 6.0
@@ -174,10 +175,10 @@ def test_only_roots_are_emitted_and_an_inner_function_is_shared():
     def second(x):
         return 2.0 * inner(x)
 
-    jit.address(lambda x: x, float64(float64))  # with it the runtime's own functions
+    jit.address(lambda x: x, FLOAT(FLOAT))  # with it the runtime's own functions
     before = list(linking.emitted)
     for function in (first, second):
-        jit.address(function, float64(float64))
+        jit.address(function, FLOAT(FLOAT))
     new = linking.emitted[len(before) :]
     assert [name.rsplit(".", 1)[-1] for name in new] == ["first", "second"]
 
@@ -193,7 +194,7 @@ def branch(x):
 
 
 def test_what_a_root_and_an_inner_function_call_is_compiled_once(monkeypatch):
-    jit._register()
+    compiling.register()
     seen = []
     compile_extra = CompilerBase.compile_extra
 
@@ -206,18 +207,18 @@ def test_what_a_root_and_an_inner_function_call_is_compiled_once(monkeypatch):
     def root(x):
         return leaf(x) + branch(x)
 
-    jit.address(root, float64(float64))
+    jit.address(root, FLOAT(FLOAT))
     assert seen.count("leaf") == seen.count("branch") == seen.count("root") == 1
 
 
 def test_callers_with_other_options_get_forms_of_their_own():
-    jit._register()
+    compiling.register()
 
     @jitable
     def quotient(x):
         return 1.0 / x
 
-    jit._register()
+    compiling.register()
     inherits = njit(error_model="numpy")(lambda x: quotient(x))
     assert inherits(0.0) == math.inf
     strict, loose = (njit(error_model=model)(lambda x: 1.0 / x) for model in ("python", "numpy"))
@@ -321,7 +322,7 @@ def drawn(n):
 
 @pytest.mark.parametrize("function", [closures_and_lists, whole_arrays, drawn])
 def test_what_numba_rewrites_gives_what_python_gives(function):
-    jit._register()
+    compiling.register()
 
     def flat(value):
         if isinstance(value, tuple | list):
@@ -334,7 +335,7 @@ def test_what_numba_rewrites_gives_what_python_gives(function):
 
 
 def test_references_are_counted_and_given_back():
-    jit._register()
+    compiling.register()
 
     @njit
     def kept(n):
@@ -356,7 +357,7 @@ def test_references_are_counted_and_given_back():
 
 
 def test_an_error_is_told_with_where_it_is():
-    jit._register()
+    compiling.register()
 
     @njit
     def wrong(x):
@@ -369,7 +370,7 @@ def test_an_error_is_told_with_where_it_is():
 
 def test_sizes_of_types_are_as_llvm_says():
     context = cpu_target.target_context
-    jit._register()
+    compiling.register()
     for kind in (float64, int64, Tuple((int64, boolean)), Array(float64, 2, "C")):
         laid_out = context.get_value_type(kind)
         for _ in range(2):
@@ -459,12 +460,12 @@ def kept_of_each(n):
     ],
 )
 def test_plain_code_gives_what_python_gives(function, make):
-    jit._register()
+    compiling.register()
     assert njit(error_model="numpy")(function)(*make()) == function(*make())
 
 
 def test_variables_assigned_once_take_no_memory():
-    jit._register()
+    compiling.register()
 
     @njit
     def placed(a, x):
@@ -534,7 +535,7 @@ def test_who_uses_an_array_is_counted_only_where_some_are_made():
     def makes(address, count):
         return _largest(floats_at(address, count) + np.zeros(count))
 
-    signature = float64(int64, int64)
+    signature = FLOAT(INT, INT)
     for function, allocates in ((passes_on, False), (passes_on, True), (makes, True)):
         jit._kept.pop((function, signature), None)
         jit._known.clear()
@@ -572,7 +573,7 @@ def test_what_a_root_links_in_is_its_own_and_takes_what_it_reads():
     def root(n, x):
         return _lengths(_Wide(x, 2.0 * x, 2.0 * x, 7.0), n)
 
-    signature = float64(int64, float64)
+    signature = FLOAT(INT, FLOAT)
     found = jit.address(root, signature)
     functions = [
         f
@@ -589,9 +590,9 @@ def test_what_a_root_links_in_is_its_own_and_takes_what_it_reads():
 COMPILED = """
 import sys
 import mbsim
-from mbsim.core import jit
+from mbsim.core import compiling, jit
 from numba.core.lowering import Lower
-jit._register()
+compiling.register()
 lower, names = Lower.lower, set()
 
 def noted(self):

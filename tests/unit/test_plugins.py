@@ -131,7 +131,7 @@ def test_a_second_process_loads_from_the_cache(tmp_path):
     assert first > 0
     assert second == 0
     assert files == later
-    assert any(file.endswith(".nbc") for file in files)
+    assert any(file.endswith(".code") for file in files)
 
 
 # -- the whitelist and the rewriting

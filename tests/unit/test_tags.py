@@ -14,7 +14,7 @@ from mbsim.arrays.scene import Scene
 from mbsim.compile_model.build import build
 from mbsim.compile_model.tangent import Tangent
 from mbsim.core import tags
-from mbsim.core.address import GroupType
+from mbsim.core.address_forms import GroupType
 from mbsim.core.arrays import F1, F2, I1
 from mbsim.errors import ModelError
 from mbsim.integrators import catalog, scheme

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from numba import float64
 
 from mbsim.cli.main import main
-from mbsim.core import jit, processors
+from mbsim.core import jit, machine_code, processors
+from mbsim.core.signature import FLOAT
 from mbsim.errors import ModelError
 from mbsim.geometry.catalog import PAIRS, REGIONS
 from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
@@ -39,7 +39,6 @@ hertz(1e-3, 0.1, constants.ctypes.data, out.ctypes.data)
 print(jit.total, out[0].hex())
 """
 LACKS = """
-from numba.core import codegen
 from mbsim.core import processors
 processors.get_host_cpu_features = lambda: ""
 processors.FAMILIES["{family}"] = ("a feature of tomorrow",)
@@ -66,7 +65,7 @@ def in_a_process(cache, shipped="", before="", **more):
 
 def stored(folder):
     """Return the files of code below a folder, with their times."""
-    return {file: file.stat().st_mtime_ns for file in Path(folder).rglob("*.nb[ci]")}
+    return {file: file.stat().st_mtime_ns for file in Path(folder).rglob("*.code")}
 
 
 @pytest.fixture(scope="module")
@@ -160,13 +159,13 @@ def test_what_a_run_lacks_is_counted_before_it_is_compiled(monkeypatch):
     monkeypatch.setattr(jit, "is_known", lambda function: True)
     monkeypatch.setattr(jit, "compiled", 0)
     monkeypatch.setattr(jit, "expected", 0)
-    monkeypatch.setattr(jit, "CodeCache", Nowhere)
+    monkeypatch.setattr(machine_code, "Place", Nowhere)
     monkeypatch.setattr(jit, "on_plan", lambda: told.append((jit.compiled, jit.expected)))
     monkeypatch.setattr(jit, "on_compile", lambda name: made.append((jit.compiled, jit.expected)))
-    jit.address(functions[0], float64(float64))
+    jit.address(functions[0], FLOAT(FLOAT))
 
     def make():
-        asked.append(jit.planned(lambda: [jit.address(f, float64(float64)) for f in functions]))
+        asked.append(jit.planned(lambda: [jit.address(f, FLOAT(FLOAT)) for f in functions]))
         return asked[-1]
 
     addresses = jit.planned(make)
@@ -181,13 +180,13 @@ def test_what_a_run_lacks_is_counted_before_it_is_compiled(monkeypatch):
     assert told == [(1, 3)]
 
 
-class Nowhere(jit.CodeCache):
-    """A cache in which nothing is ever found."""
+class Nowhere(machine_code.Place):
+    """A place in which nothing is ever found."""
 
-    def _find(self, key):
+    def find(self):
         return None
 
-    def _save_overload(self, sig, data):
+    def keep(self, code):
         pass
 
 

@@ -256,7 +256,7 @@ def pivot_of(scene: Scene, t: float, e: int, left: float, passing: bool) -> floa
     part = left / (NAUGHT * quality[USUAL] * size) if quality[USUAL] > 0.0 else math.inf
     if part < 1e-4 or released:
         return math.inf
-    return math.sqrt(left * (1.0 + part**-8) if part < 100.0 else left)
+    return math.sqrt(left * (1.0 + 1.0 / part**8) if part < 100.0 else left)
 
 
 @jitable

@@ -17,6 +17,7 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
+from mbsim.core.counting import number_of_parts
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import dot, norm, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_graphics
@@ -69,7 +70,8 @@ def gather(scene: Scene, pair: int) -> None:
     kind, first = scene.pairs.kind[pair], scene.pairs.slot[pair]
     last = len(hit) - 1
     # what is behind the first row of an incident with an area is in that
-    for s in range(first, first + scene.kinds.slots[kind], scene.kinds.step[kind]):
+    for k in range(number_of_parts(scene.kinds.slots[kind], scene.kinds.step[kind])):
+        s = first + k * scene.kinds.step[kind]
         depth = work.points[s, AT_DEPTH]
         if (
             depth > 0.0

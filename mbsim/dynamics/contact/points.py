@@ -36,6 +36,7 @@ from mbsim.arrays.hooks import FclPoints, Hook, Recall, answer_of
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1, F2
+from mbsim.core.counting import number_of_parts
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, norm, rotate, sub, unrotate, vector
 from mbsim.dynamics.bodies.kinematics import position
@@ -425,16 +426,18 @@ def keep_slots(scene: Scene, pair: int) -> None:
         pass_on(scene, pair, work.points, pairs.slot[pair])
         return
     kind, first = pairs.kind[pair], pairs.slot[pair]
-    step, last = scene.kinds.step[kind], first + scene.kinds.slots[kind]
-    left = pairs.touches[pair]
+    step = scene.kinds.step[kind]
+    many, left = number_of_parts(scene.kinds.slots[kind], step), pairs.touches[pair]
     settled = 0  # bits of slots that have their incident
     while left > 0:
         slot, incident, least = -1, -1, math.inf
-        for s in range(first, last, step):
-            if state.touching[s] == 0 or settled >> ((s - first) // step) & 1:
+        for i in range(many):
+            s = first + i * step
+            if state.touching[s] == 0 or settled >> i & 1:
                 continue
-            for k in range(first, last, step):
-                if work.points[k, AT_DEPTH] <= 0.0 or settled >> ((k - first) // step) & 1:
+            for j in range(many):
+                k = first + j * step
+                if work.points[k, AT_DEPTH] <= 0.0 or settled >> j & 1:
                     continue
                 way = sub(vector(work.points[k, AT_POINT:]), vector(state.p[s]))
                 if dot(way, way) < least:

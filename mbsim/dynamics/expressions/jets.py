@@ -8,14 +8,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba.extending import overload
-
 from mbsim.arrays.codes import JET_CURVATURE, JET_SLOPE, JET_VALUE, USED_ROWS
 from mbsim.arrays.hooks import Hook, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1, V3
-from mbsim.core.jitable import jitable
+from mbsim.core.jitable import compiled_form, jitable
 from mbsim.dynamics.expressions.interpreter import interpret
 from mbsim.dynamics.expressions.measures import AS_THEY_ARE
 from mbsim.dynamics.expressions.values import evaluate_program
@@ -26,7 +24,7 @@ def run(scene: Scene, t: float, y: F1, program: int, body: int, direction: int) 
     return interpret(scene, t, y, program, body, direction)
 
 
-@overload(run)
+@compiled_form(run)
 def _run(scene: Any, t: Any, y: Any, program: Any, body: Any, direction: Any) -> Any:
     """Give compiled code its form of `run`: a call of the hook."""
 
@@ -43,7 +41,7 @@ def value(scene: Scene, t: float, y: F1, program: int) -> float:
     return evaluate_program(scene, t, y, program)
 
 
-@overload(value)
+@compiled_form(value)
 def _value(scene: Any, t: Any, y: Any, program: Any) -> Any:
     """Give compiled code its form of `value`: a call of the hook."""
 

@@ -320,7 +320,8 @@ def contact_force(scene: Scene, y: F1, contact: int, jflag: int, k: int, comp: i
         if contact_of(scene, s) == contact:
             values, point = work.slot[s], work.points[s]
             deepest = max(deepest, values[DEPTH])
-            graphic = sides(scene, s)[jflag]
+            of_i, of_j = sides(scene, s)
+            graphic = of_i if jflag == 0 else of_j
             push = vector(values[FORCE : FORCE + 3])
             arm = sub(vector(point[AT_POINT:]), position(scene, y, scene.graphics.body[graphic]))
             force = add(force, push)

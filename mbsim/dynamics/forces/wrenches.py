@@ -9,15 +9,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from numba.extending import overload
-
 from mbsim.arrays.codes import LOST_POWER, STORED_ENERGY, WRENCH
 from mbsim.arrays.hooks import Hook
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.arrays import F1, V3
 from mbsim.core.codes import Code
-from mbsim.core.jitable import jitable
+from mbsim.core.jitable import compiled_form, jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.bodies.markers import marker_axis, marker_point
@@ -29,7 +27,7 @@ def wrench(scene: Scene, t: float, y: F1, f: int) -> int:
     return add_wrench(scene, t, y, f)
 
 
-@overload(wrench)
+@compiled_form(wrench)
 def _wrench(scene: Any, t: Any, y: Any, f: Any) -> Any:
     """Give compiled code its form of `wrench`: a call of the hook."""
 

@@ -19,7 +19,6 @@ from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import types
 
 from mbsim.arrays.codes import MULTI_POINT, RESIDUAL, VECTOR_FORCE, WRENCH
 from mbsim.arrays.hooks import Hook
@@ -27,13 +26,12 @@ from mbsim.arrays.scene import Scene
 from mbsim.compile_model.tangent import Tangent
 from mbsim.core import jit
 from mbsim.core.problem import HOOK
+from mbsim.core.signature import COMPLEX_POINTER, FLOAT, INT, POINTER
 from mbsim.geometry.catalog import REGION_ROWS
 
-_INT, _T, _PTR = types.int64, types.float64, types.CPointer(types.float64)
-_COMPLEX = types.CPointer(types.complex128)
-_AT = _INT(_INT, _T, _PTR)  # context, t, y
-_FORCES = _INT(_INT, _T, _PTR, _PTR)  # context, t, y, dy
-_KEEPS = _INT(_INT, _INT, _T, _PTR)  # context, request, t, y
+_AT = INT(INT, FLOAT, POINTER)  # context, t, y
+_FORCES = INT(INT, FLOAT, POINTER, POINTER)  # context, t, y, dy
+_KEEPS = INT(INT, INT, FLOAT, POINTER)  # context, request, t, y
 
 
 class Method(NamedTuple):
@@ -220,7 +218,7 @@ TABLE = (
     # evaluation
     Row(
         Hook.CONTACTS,
-        _INT(_INT, _INT, _T, _T, _PTR, _PTR),  # context, request, t, h, y, y' or energies
+        INT(INT, INT, FLOAT, FLOAT, POINTER, POINTER),  # context, request, t, h, y, y' or energies
         _has_contacts,
         _of("pipeline.contact_hooks", "serve_contacts"),
         "does what contacts are asked for: `Contacts`",
@@ -228,28 +226,28 @@ TABLE = (
     ),
     Row(
         Hook.FCL,
-        _INT(_INT),  # how many pairs of `Work.fcl`
+        INT(INT),  # how many pairs of `Work.fcl`
         _never,
         _no_entry,
         "writes the points of pairs without a closed form; a scene with such a pair has it",
     ),
     Row(
         Hook.SLOTS,
-        _INT(_INT, _INT),  # context, pair
+        INT(INT, INT),  # context, pair
         _any("kinds", "moves"),
         _of("pipeline.contact_hooks", "keep_slots_of"),
         "puts incidents that have no identity of their own into the slots that they had",
     ),
     Row(
         Hook.TILTING,
-        _INT(_INT, _INT, _T, _T, _PTR),  # context, slot, t, normal force, y
+        INT(INT, INT, FLOAT, FLOAT, POINTER),  # context, slot, t, normal force, y
         _has_faces,
         _of("pipeline.contact_hooks", "damp_contact"),
         "finds the couple against tilting of a flat face that is one incident",
     ),
     Row(
         Hook.RECALL,
-        _INT(_INT, _INT, _INT, _T, _PTR, _INT),  # context, request, slot, t, y or y', 1 for anew
+        INT(INT, INT, INT, FLOAT, POINTER, INT),  # context, request, slot, t, y or y', 1 for anew
         _any("contacts", "memory"),
         _of("pipeline.contact_hooks", "recall_friction"),
         "does what friction of contacts with memory is asked for: `Recall`",
@@ -257,21 +255,21 @@ TABLE = (
     ),
     Row(
         Hook.SPREAD,
-        _INT(_INT, _INT, _INT),  # context, slot, contact
+        INT(INT, INT, INT),  # context, slot, contact
         _spreads,
         _of("pipeline.contact_hooks", "friction_of_patch"),
         "asks a friction law all over a patch",
     ),
     Row(
         Hook.RIM,
-        _INT(_INT, _INT, _INT),  # context, slot, contact
+        INT(INT, INT, INT),  # context, slot, contact
         _any("contacts", "rims"),
         _of("pipeline.contact_hooks", "friction_of_rim"),
         "asks a friction law all round the rim that a body stands on",
     ),
     Row(
         Hook.HOLD_BACK,
-        _INT(_INT, _INT, _T, _T, _T, _PTR),  # context, slot, h, slip along x and y, y
+        INT(INT, INT, FLOAT, FLOAT, FLOAT, POINTER),  # context, slot, h, slip along x and y, y
         _fixes_steps,
         _of("pipeline.contact_hooks", "hold_friction_back"),
         "reduces friction to what a step of fixed length can follow",
@@ -279,7 +277,7 @@ TABLE = (
     ),
     Row(
         Hook.VALUE,
-        _T(_INT, _T, _PTR, _INT),  # context, t, y, program
+        FLOAT(INT, FLOAT, POINTER, INT),  # context, t, y, program
         lambda scene, method: len(scene.programs.start) > 1,
         _of("pipeline.force_hooks", "evaluate_expression"),
         "evaluates an expression",
@@ -287,7 +285,7 @@ TABLE = (
     ),
     Row(
         Hook.JET,
-        _INT(_INT, _T, _PTR, _INT, _INT, _INT),  # context, t, y, program, body, direction
+        INT(INT, FLOAT, POINTER, INT, INT, INT),  # context, t, y, program, body, direction
         _needs_jets,
         _of("pipeline.force_hooks", "express"),
         "leaves an expression and its rates in the first row of `Programs.stack`",
@@ -301,21 +299,21 @@ TABLE = (
     ),
     Row(
         Hook.WRENCH,
-        _INT(_INT, _T, _PTR, _INT),  # context, t, y, row of `Applied`
+        INT(INT, FLOAT, POINTER, INT),  # context, t, y, row of `Applied`
         _has_wrenches,
         _wrench,
         "adds a marker force or a vector force",
     ),
     Row(
         Hook.ELEMENT,
-        _INT(_INT, _T, _PTR, _INT, _INT),  # context, t, y, element, component
+        INT(INT, FLOAT, POINTER, INT, INT),  # context, t, y, element, component
         _rows("residuals", "id"),
         _of("pipeline.force_hooks", "serve_element"),
         "solves a Force_Element for what expressions ask of it",
     ),
     Row(
         Hook.JOINTS,
-        _INT(_INT, _INT, _T, _PTR, _PTR),  # context, request, t, y, dy
+        INT(INT, INT, FLOAT, POINTER, POINTER),  # context, request, t, y, dy
         _rows("tree", "body"),
         _joints,
         "does what joints are asked for: `Joints`",
@@ -330,7 +328,7 @@ TABLE = (
     ),
     Row(
         Hook.HIGHER_PAIRS,
-        _INT(_INT, _INT, _INT, _PTR),  # context, term, 1 to find anew where it touches, y
+        INT(INT, INT, INT, POINTER),  # context, term, 1 to find anew where it touches, y
         lambda scene, method: _has_pairs(scene),
         _of("pipeline.force_hooks", "fill_higher_pair"),
         "fills a term of an equation of a higher pair",
@@ -338,7 +336,7 @@ TABLE = (
     ),
     Row(
         Hook.RELATIONS,
-        _INT(_INT, _T, _PTR, _INT),  # context, t, y, equation
+        INT(INT, FLOAT, POINTER, INT),  # context, t, y, equation
         _any("equations", "user"),
         _of("pipeline.force_hooks", "relate_terms"),
         "makes the sum of an equation's terms a user's relation of them",
@@ -375,14 +373,14 @@ TABLE = (
     ),
     Row(
         Hook.CONTACT_SLOPES,
-        _INT(_INT, _INT, _T, _T, _PTR),  # context, request, t, h, y
+        INT(INT, INT, FLOAT, FLOAT, POINTER),  # context, request, t, h, y
         _linearised(_has_contacts),
         _of("pipeline.implicit_hooks", "slopes_of_contacts"),
         "does what derivatives of contacts are asked for: `ContactSlopes`",
     ),
     Row(
         Hook.FACE_SLOPES,
-        _T(_INT, _INT, _INT, _T, _T, _PTR),  # context, request, slot, two numbers, y
+        FLOAT(INT, INT, INT, FLOAT, FLOAT, POINTER),  # context, request, slot, two numbers, y
         _linearised(_has_faces),
         _of("pipeline.implicit_hooks", "slopes_of_faces"),
         "does what derivatives of flat faces are asked for that are one incident: `FaceSlopes`",
@@ -390,7 +388,7 @@ TABLE = (
     ),
     Row(
         Hook.MEMORY,
-        _INT(_INT, _INT, _PTR, _PTR),  # context, request, r, d
+        INT(INT, INT, POINTER, POINTER),  # context, request, r, d
         _has_memory,
         _of("linearization.memory_slopes", "serve_memory"),
         "does what friction with memory is asked for in real systems: `Memory`",
@@ -404,7 +402,7 @@ TABLE = (
     ),
     Row(
         Hook.MEMORY_PAIR,
-        _INT(_INT, _INT, _COMPLEX, _COMPLEX),
+        INT(INT, INT, COMPLEX_POINTER, COMPLEX_POINTER),
         lambda scene, method: _has_memory(scene, method) and method.pair,
         _of("linearization.memory_slopes", "serve_memory_pair"),
         "does the same in complex systems",
@@ -412,7 +410,7 @@ TABLE = (
     # a step is taken
     Row(
         Hook.GAUGES,
-        _T(_INT, _INT, _T, _T, _PTR, _PTR),  # context, request, t, h, error, y
+        FLOAT(INT, INT, FLOAT, FLOAT, POINTER, POINTER),  # context, request, t, h, error, y
         _has_contacts,
         _gauges,
         "measures contacts: `Gauges`",
@@ -420,7 +418,7 @@ TABLE = (
     ),
     Row(
         Hook.EFFECTS,
-        _T(_INT, _INT, _T, _T, _PTR, _PTR),  # context, request, t, h, error, y
+        FLOAT(INT, INT, FLOAT, FLOAT, POINTER, POINTER),  # context, request, t, h, error, y
         _linearised(_has_contacts),
         _of("pipeline.contact_hooks", "measure_effects"),
         "measures what an error does to contacts: `Effects`; of explicit methods nothing knows it",
@@ -428,7 +426,7 @@ TABLE = (
     ),
     Row(
         Hook.STABILITY,
-        _T(_INT, _INT, _PTR, _PTR),  # context, request, y, y'
+        FLOAT(INT, INT, POINTER, POINTER),  # context, request, y, y'
         _fixes_steps,
         _of("pipeline.contact_hooks", "bound_contacts"),
         "bounds steps of a method without error estimate: `Stability`",
@@ -436,7 +434,7 @@ TABLE = (
     ),
     Row(
         Hook.PASSING,
-        _T(_INT, _INT, _T, _PTR, _PTR),  # context, pair, the time asked for, y, y'
+        FLOAT(INT, INT, FLOAT, POINTER, POINTER),  # context, pair, the time asked for, y, y'
         lambda scene, method: bool(scene.kinds.bound.any()),
         _of("pipeline.contact_hooks", "bound_passing"),
         "finds how long a pair of a mesh that touches passes through no wall",
@@ -444,7 +442,7 @@ TABLE = (
     ),
     Row(
         Hook.FCL_POINTS,
-        _T(_INT, _INT, _INT, _T, _PTR),  # context, request, slot or pair, h, y
+        FLOAT(INT, INT, INT, FLOAT, POINTER),  # context, request, slot or pair, h, y
         lambda scene, method: bool((scene.kinds.kernel == 0).any()),
         _of("pipeline.contact_hooks", "serve_fcl_points"),
         "looks at points of pairs without a closed form: `FclPoints`",
@@ -460,14 +458,14 @@ TABLE = (
     ),
     Row(
         Hook.ANGLES,
-        _INT(_INT, _PTR),  # context, y
+        INT(INT, POINTER),  # context, y
         _has_ways,
         lambda of: _of("pipeline.force_hooks", ("commit_turns", "commit_ways")[_has_pairs(of)])(of),
         "counts the turns of angles, and follows higher pairs",
     ),
     Row(
         Hook.NEAR,
-        _INT(_INT, _PTR),  # context, y
+        INT(INT, POINTER),  # context, y
         _rows("broadphase", "contact"),
         _of("pipeline.hooks", "list_near"),
         "lists near pairs anew where shapes have moved far enough",

@@ -47,6 +47,7 @@ from mbsim.arrays.hooks import Contacts, Effects, Gauges, Hook, Joints, answer_o
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_float, call_int
 from mbsim.core.arrays import F1, V2
+from mbsim.core.counting import number_of_parts
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.core.problem import GOES, LISTED
@@ -377,8 +378,8 @@ def fill_sizes(scene: Scene, d: F1, y: F1) -> None:
     scales, squares, n = scene.scales, scene.work.squares, len(y)
     count = len(scene.bodies.mass)
     fill_squares(scene, y)
-    for first in range(0, len(d), n):
-        e, largest = d[first : first + n], 0.0
+    for part in range(number_of_parts(len(d), n)):
+        e, largest = d[part * n : (part + 1) * n], 0.0
         if count == 0:
             e[0] = scaled_error(scene, 0.0, e, y)
             continue

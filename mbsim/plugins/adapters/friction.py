@@ -9,12 +9,11 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from numba.extending import register_jitable
-
 from mbsim.core import jit
 from mbsim.core.address import as_tuple, vector_at
 from mbsim.core.arrays import F1, Pointer
 from mbsim.core.codes import Code
+from mbsim.core.jitable import mark
 from mbsim.core.rotation import vector
 from mbsim.laws.abi import (
     AREA_IN,
@@ -125,7 +124,7 @@ def friction_address(
     """Return the address of a rewritten CFFSUB behind FRICTION_SIGNATURE."""
     # as Python: a division by zero raises, an index beyond the end too
     for each in (*callees, function):
-        register_jitable(error_model="python", boundscheck=True)(each)
+        mark(each, error_model="python", boundscheck=True)
     if states:
         return jit.address(
             _adapt_with_state(function, count, states), FRICTION_SIGNATURE, allocates=True

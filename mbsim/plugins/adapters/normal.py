@@ -11,14 +11,12 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import types
-from numba.extending import overload, register_jitable
 
 from mbsim.core import jit
 from mbsim.core.address import as_tuple, call_int, vector_at, view
 from mbsim.core.arrays import F1, I1, Pointer
 from mbsim.core.codes import Code
-from mbsim.core.jitable import jitable
+from mbsim.core.jitable import compiled_form, jitable, mark
 from mbsim.core.memory import floats_at
 from mbsim.laws.abi import NORMAL_SIGNATURE
 from mbsim.laws.user_normal import (
@@ -108,8 +106,10 @@ def only_one(result: Any) -> float:
     raise NotImplementedError  # `_only_one` is its compiled form
 
 
-@overload(only_one)
+@compiled_form(only_one)
 def _only_one(result: Any) -> Callable[[Any], float]:
+    from numba import types
+
     # Numba compares annotations too: a lambda, which has none, is not taken
     def from_number(result: Any) -> float:
         return float(result)
@@ -166,5 +166,5 @@ def _adapt(function: Callable[..., Any], count: int) -> Any:
 def normal_address(function: Callable[..., Any], callees: list[Any], count: int) -> int:
     """Return the address of a rewritten CNFSUB behind NORMAL_SIGNATURE."""
     for each in (*callees, function):
-        register_jitable(error_model="python", boundscheck=True)(each)
+        mark(each, error_model="python", boundscheck=True)
     return jit.address(_adapt(function, count), NORMAL_SIGNATURE, allocates=True)

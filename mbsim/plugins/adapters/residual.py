@@ -8,12 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from numba.extending import register_jitable
-
 from mbsim.core import jit
 from mbsim.core.address import as_tuple, vector_at
 from mbsim.core.arrays import F1, Pointer
 from mbsim.core.codes import Code
+from mbsim.core.jitable import mark
 from mbsim.laws.abi import FRICTION_SIGNATURE
 
 
@@ -50,5 +49,5 @@ def residual_address(
 ) -> int:
     """Return the address of a rewritten residual behind FRICTION_SIGNATURE."""
     for each in (*callees, function):
-        register_jitable(error_model="python", boundscheck=True)(each)
+        mark(each, error_model="python", boundscheck=True)
     return jit.address(_adapt(function, count, axes, unknowns), FRICTION_SIGNATURE, allocates=True)
