@@ -111,17 +111,21 @@ class _Found(NamedTuple):
 def _look(model: str, overrides: tuple[str, ...]) -> _Found:
     """Return what is said of a deck; raise `MbsimError` where it cannot be run."""
     from mbsim.compile_model.acting import check_expressions
-    from mbsim.compile_model.advice import advice as of_contacts
+    from mbsim.compile_model.advice import advice as of_laws
     from mbsim.compile_model.pairing import plan_pairs, why_costly
     from mbsim.model.names import is_adams
-    from mbsim.plugins import check_libraries
+    from mbsim.model.subroutines import of_contacts, wanted
     from mbsim.reader.xml import read_model
     from mbsim.run.settings import settle
 
     deck = read_model(model, overrides)
     plans = plan_pairs(deck)
     check_expressions(deck)
-    check_libraries(deck)
+    users = [*(user for *_, user in of_contacts(deck)), *(each.user for each in wanted(deck))]
+    if any(user.dll_name for user in users):
+        from mbsim.plugins import check_libraries
+
+        check_libraries(deck)
     # values that a run would refuse; times may still come from the command line
     notes = settle(deck).notes if deck.simulations else ()
 
@@ -137,7 +141,7 @@ def _look(model: str, overrides: tuple[str, ...]) -> _Found:
         for (id, why), count in costly.items()
         if why
     ]
-    said += of_contacts(deck)
+    said += of_laws(deck)
     said += _meshes(deck)
     said += [
         (element, "its subroutine names no file; a run needs --plugin FILE.py")

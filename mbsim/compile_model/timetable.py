@@ -336,13 +336,15 @@ def follows_time(scene: Scene) -> bool:
 
 def _asks_time(system: System) -> bool:
     """Return whether a user's function may look at the time."""
+    if any(name[0] != STATEMENT and user.acts for name, user in system.subroutines.items()):
+        return True
+    if not system.user_laws:
+        return False
     from importlib.util import decode_source
 
     from mbsim.core.stored import read_regular
     from mbsim.plugins.source.diagnose import reads_parameter
 
-    if any(name[0] != STATEMENT and user.acts for name, user in system.subroutines.items()):
-        return True
     for _, user in system.user_laws:
         source = user.source
         if user.function is None or source.suffix != ".py":

@@ -72,6 +72,14 @@ def calls(each: Wanted) -> tuple[tuple[int, ...], ...]:
     return ((0,),) if each.call in (Call.PLAIN, Call.RELATION) else ((0, 0),)
 
 
+def of_contacts(model: Model) -> Iterator[tuple[str, str, Subroutine]]:
+    """Yield the subroutines of contacts: the element, the prefix of their attributes."""
+    for contact in model.contacts.values():
+        for prefix, user in (("cff", contact.cff), ("cnf", contact.cnf), ("cpost", contact.cpost)):
+            if user is not None:
+                yield f"Force_Contact[{contact.id}]", prefix, user
+
+
 def wanted(model: Model) -> list[Wanted]:
     """Return all user subroutines that stand in place of expressions."""
     return list(_wanted(model))

@@ -15,16 +15,14 @@ from mbsim.laws.catalog import NORMAL_LAWS, friction_law_of
 from mbsim.model.elements import Contact, Model
 from mbsim.model.names import element_name, statement_name
 from mbsim.reader.activity import statement_of
-from mbsim.results.audit import Audit
 from mbsim.results.elements import APPLIED, CONSTRAINTS, GROUPS, elements_of, equations
 from mbsim.results.elements import title as title_of
-from mbsim.results.files import replace_text
-from mbsim.results.forces import actings, marker_actings
-from mbsim.results.store import Value
-from mbsim.results.watch import Watch, energies
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
+    from mbsim.results.audit import Audit
+    from mbsim.results.store import Value
+    from mbsim.results.watch import Watch
 
 #: A user subroutine may talk at every evaluation; no more lines than this are kept.
 MOST_LINES = 20_000
@@ -98,6 +96,8 @@ class RunLog:
             If it cannot be written.
         """
         if self.path is not None:
+            from mbsim.results.files import replace_text
+
             replace_text(self.path, "\n".join(self.lines) + "\n")
         self._written_at = time.monotonic()
 
@@ -237,6 +237,8 @@ def header(system: System, attributes: Mapping[str, Value]) -> Iterator[str]:
         yield f"  note: {note}"
     for warning in model.warnings:
         yield f"  warning: {warning}"
+    from mbsim.results.forces import actings, marker_actings
+
     elements = actings(system)
     for request in model.requests.values():
         if request.type == "MARKER_FORCE" and not marker_actings(system, elements, request):
@@ -380,6 +382,8 @@ def _energy_lines(system: System, watch: Watch) -> Iterator[str]:
     """Yield the energies at the end, and how far their balance is from what it was at first."""
     if watch.first is None or watch.last is None:
         return
+    from mbsim.results.watch import energies
+
     names = energies(system)
     yield ""
     yield "energy at the end"

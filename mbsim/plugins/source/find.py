@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from mbsim.errors import ModelError
 from mbsim.model.elements import Contact, Model, Subroutine
-from mbsim.model.subroutines import wanted
+from mbsim.model.subroutines import of_contacts, wanted
 from mbsim.plugins.source.octave import SUFFIX, OctaveFile, read_octave
 from mbsim.plugins.source.script import Script, Scripts, load_script, require
 from mbsim.plugins.source.shared_library import Library, choose, is_library, read_library
@@ -24,12 +24,7 @@ def check_libraries(model: Model) -> None:
     ModelError
         With a line for each that is not there, or whose language is not clear.
     """
-    named = [
-        (f"Force_Contact[{contact.id}]", prefix, user)
-        for contact in model.contacts.values()
-        for prefix, user in (("cff", contact.cff), ("cnf", contact.cnf), ("cpost", contact.cpost))
-        if user is not None
-    ]
+    named = list(of_contacts(model))
     named += [(f"{each.statement}[{each.id}]", "usrsub", each.user) for each in wanted(model)]
     faults = []
     for element, prefix, user in named:
