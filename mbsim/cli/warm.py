@@ -50,6 +50,7 @@ def command(
         return
     from mbsim.core import code_cache, jit
     from mbsim.errors import ResultsError
+    from mbsim.warming.bytecode import keep_bytecode
     from mbsim.warming.tasks import refused, tasks
 
     nothing_kept = ResultsError(f"{code_cache.cache_root()}: compiled code cannot be kept there")
@@ -58,6 +59,7 @@ def command(
         raise nothing_kept  # now, not after minutes
     began = time.perf_counter()
     before = jit.total
+    keep_bytecode()  # where it cannot be kept, starts take longer, and nothing else
     todo = tasks(everything, models)
     failed = _do_all(todo, refused)
     for line in failed:

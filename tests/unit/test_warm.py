@@ -13,13 +13,14 @@ import pytest
 from click.testing import CliRunner
 
 from mbsim.cli.main import main
-from mbsim.core import jit, machine_code, processors
+from mbsim.core import code_cache, jit, machine_code, processors
 from mbsim.core.signature import FLOAT
 from mbsim.errors import ModelError
 from mbsim.geometry.catalog import PAIRS, REGIONS
 from mbsim.laws.catalog import FRICTION_LAWS, NORMAL_LAWS
 from mbsim.warming import tasks
 
+PACKAGE = code_cache.PACKAGE
 ROOT = Path(__file__).resolve().parents[2]
 DROP = str(ROOT / "models" / "drop_m.xml")
 #: Any machine that runs the tests runs the code of one of these.
@@ -197,6 +198,25 @@ def test_all_that_is_registered_is_warmed():
     assert {f"bowling_ball.xml {name}" for name in tasks.METHODS} <= names
     usual = {task.name for task in tasks.tasks(False, [])}
     assert usual <= names
+
+
+def test_bytecode_is_kept_where_python_may_not_write_it(tmp_path):
+    copied = tmp_path / "mbsim"
+    for name in ("core", "warming"):
+        shutil.copytree(PACKAGE / name, copied / name, ignore=shutil.ignore_patterns("*.pyc"))
+    for file in PACKAGE.glob("*.py"):
+        shutil.copy(file, copied)
+    (copied / "core" / "broken.py").write_text("1 +")
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment.pop("PYTHONPYCACHEPREFIX", None)
+    script = "from mbsim.warming.bytecode import keep_bytecode; print(keep_bytecode())"
+    line = [sys.executable, "-c", script]
+    done = subprocess.run(
+        line, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
+    )
+    assert (done.stdout, done.stderr) == ("False\n", "")
+    sources = {file.stem for file in copied.rglob("*.py")} - {"broken"}
+    assert {file.name.split(".")[0] for file in copied.rglob("*.pyc")} == sources
 
 
 def test_warm_runs_a_model_and_names_one_that_it_cannot(tmp_path):
