@@ -2,20 +2,22 @@
 
 What calls that can only be loaded with Numba (`core.machine_code`). `math.frexp` and `math.ldexp`
 are C's, which leaves open what exponent belongs to what is not finite. A power of 0 is infinite
-where its exponent is a negative integer, as all divisions by 0 are here; Numba's raises. All else
-has the bits that Numba's have.
+where its exponent is a negative integer, and a complex number over 0 is not a number, as all
+divisions by 0 are here no error; Numba's raise. All else has the bits that Numba's have.
 """
 
 from __future__ import annotations
 
 import math
 import operator
+import sys
 from typing import Any
 
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.imputils import impl_ret_untracked, lower_builtin
+from numba.extending import register_jitable
 
 _DOUBLE = ir.DoubleType()
 
@@ -71,8 +73,37 @@ def _pow(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return impl_ret_untracked(context, builder, sig.return_type, found)
 
 
+@register_jitable(error_model="numpy", no_cfunc_wrapper=True)
+def _over(a: float, b: float) -> float:
+    """Return a / b, which raises nothing whoever calls it."""
+    return a / b
+
+
+def _complex_quotient(a: complex, b: complex) -> complex:
+    """Return a / b by R. L. Smith, Commun. ACM 5 (1962) 435, as Python before 3.14 and Numba do."""
+    if abs(b.real) >= abs(b.imag):
+        if b.real == 0.0:
+            return complex(math.nan, math.nan)
+        ratio = _over(b.imag, b.real)
+        part = b.real + b.imag * ratio
+        return complex(_over(a.real + a.imag * ratio, part), _over(a.imag - a.real * ratio, part))
+    if abs(b.imag) >= abs(b.real):
+        ratio = _over(b.real, b.imag)
+        part = b.real * ratio + b.imag
+        return complex(_over(a.real * ratio + a.imag, part), _over(a.imag * ratio - a.real, part))
+    return complex(math.nan, math.nan)
+
+
+def _complex_truediv(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    """Lower `complex / complex`."""
+    found = context.compile_internal(builder, _complex_quotient, sig, args)
+    return impl_ret_untracked(context, builder, sig.return_type, found)
+
+
 def install() -> None:
     """Put these before Numba's own."""
+    if sys.version_info < (3, 14):  # from there on infinities are recovered
+        lower_builtin(operator.truediv, types.complex128, types.complex128)(_complex_truediv)
     lower_builtin(operator.pow, types.float64, types.int64)(_pow)
     lower_builtin(math.frexp, types.float64)(_frexp)
     lower_builtin(math.ldexp, types.float64, types.intc)(_ldexp)

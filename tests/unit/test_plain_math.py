@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 
 import numpy as np
 import pytest
@@ -48,6 +49,24 @@ def test_numbers_are_taken_apart_as_c_does():
     compiled = FLOAT(FLOAT).at(jit.address(rounded, FLOAT(FLOAT)))
     values = [*(10.0**k for k in range(-323, 309, 7)), 0.0, -1.5, 5e-324]
     assert [compiled(x) for x in values] == [*map(rounded, values)]
+
+
+def quotient(a, b, c, d, which):
+    z = complex(a, b) / complex(c, d)
+    return z.real if which == 0 else z.imag
+
+
+@pytest.mark.skipif(sys.version_info >= (3, 14), reason="Numba's own")
+def test_complex_quotients_have_pythons_bits_and_those_by_zero_raise_nothing():
+    signature = FLOAT(FLOAT, FLOAT, FLOAT, FLOAT, INT)
+    compiled = signature.at(jit.address(quotient, signature))
+    draw = np.random.default_rng(2).normal(size=(2000, 4))
+    for a, b, c, d in [*draw.tolist(), (1.0, 2.0, 0.0, 3.0), (1.0, 2.0, 3.0, 0.0)]:
+        exact = complex(a, b) / complex(c, d)
+        assert [compiled(a, b, c, d, k) for k in (0, 1)] == [exact.real, exact.imag]
+    assert math.isnan(compiled(1.0, 2.0, 0.0, 0.0, 0))
+    code = compiling.code_of(compiling.c_function(quotient, signature, False))
+    assert code.calls == ()
 
 
 @pytest.mark.parametrize(("function", "signature"), [(power, FLOAT(FLOAT, INT)),
