@@ -2,7 +2,9 @@
 
 Unknown are displacements xi of bodies, spatial vectors (angular, linear) about O: the cg of the
 root of a body's tree, or the body's own cg. Blocks are 6 x 6, rows and columns by body. A body
-that hangs on a joint is not an unknown of its own: xi = xi of its parent + S' dq.
+that hangs on a joint is not an unknown of its own: xi = xi of its parent + S' dq. Where loops are
+many, multipliers of equations are unknowns like these, up to six of one connection in a node that
+follows the bodies; else they are the border, which is dense.
 """
 
 from __future__ import annotations
@@ -20,6 +22,8 @@ from mbsim.core.arrays import C2, C3, F1, F2, F3, F4, I1, I2
 
 #: Blocks that are made room for beside those of a model whose bodies are all coupled.
 _ALL_COUPLED, _BLOCKS_A_BODY = 100, 300
+#: Equations from which on multipliers are nodes: the border grows with the cube of their number.
+_MANY_EQUATIONS, _ROWS = 20, 6
 #: Bodies of the largest model that implicit methods take: a table of their pairs is kept.
 MOST_BODIES = 4000
 #: Fields with one entry a block: room is made for more than are in use.
@@ -30,19 +34,24 @@ _TABLE = "tangent/pattern/block"
 
 @tags.state
 class Pattern(NamedTuple):
-    """Which bodies are coupled, and in what order they are eliminated."""
+    """Which nodes are coupled, and in what order they are eliminated: bodies, then multipliers."""
 
-    block: I2  # (nb, nb) block of a pair, -1 for none
+    block: I2  # (nodes, nodes) block of a pair, -1 for none
     pair: I2  # (couplings, 2) bodies of the blocks that forces fill
-    order: I1  # (nb,) bodies
-    start: I1  # (nb + 1,) first neighbour of each step
-    neighbour: I1  # (blocks,) bodies that are eliminated later
+    order: I1  # (nodes,)
+    start: I1  # (nodes + 1,) first neighbour of each step
+    neighbour: I1  # (blocks,) nodes that are eliminated later
     count: I1  # type: ignore[assignment]  # (3,) couplings, blocks, 1 where the order is to be found anew
-    joint: tags.Constant[I1]  # (nb,) tree index of what hangs, -1 for roots and free bodies
-    parent: tags.Constant[I1]  # (nb,) body row, -1 for ground
-    children: tags.Constant[I1]  # (nb,) that hang on it
-    waiting: tags.Scratch[I1]  # (nb,) children not yet eliminated, -1 when done itself
-    degree: tags.Scratch[I1]  # (nb,)
+    joint: tags.Constant[I1]  # (nodes,) tree index of what hangs, -1 for roots and free bodies
+    parent: tags.Constant[I1]  # (nodes,) body row, -1 for ground
+    children: tags.Constant[I1]  # (nodes,) that hang on it, or bodies that its equations hold
+    waiting: tags.Scratch[I1]  # (nodes,) of these not yet eliminated, -1 when done itself
+    degree: tags.Scratch[I1]  # (nodes,)
+    rows: I1  # (nodes,) unknowns of each body, 6, or equations in use of each other node
+    node: tags.Constant[I1]  # (equations,) -1 for those of the border
+    held: tags.Constant[I1]  # (pairs,) bodies that equations of a node hold, node by node
+    first: tags.Constant[I1]  # (nodes - nb + 1,) first of these
+    at: I1  # (equations,) row in its node of each equation in use
 
 
 @tags.state
@@ -79,13 +88,16 @@ class Real(NamedTuple):
     """A factorisation with real coefficients."""
 
     A: F3  # (blocks, 6, 6)
-    pivot: F3  # (nb, 6, 6)
-    swap: I2  # (nb, 6)
+    pivot: F3  # (nodes, 6, 6)
+    swap: I2  # (nodes, 6)
+    seen: F2  # (nodes, 6) largest that the diagonal of a node of multipliers was
+    rows: I1  # (nodes,) unknowns of each; none where the border has its equations
+    dense: I1  # (border + 1,) equations in use that the border has, their number last
     B: F3  # (nb, 3, 3) d(spin)/d(turn), body axes
-    answer: F3  # (border, nb, 6)
+    answer: F3  # (border, nodes, 6)
     border: F2  # (border, border)
     border_swap: I1  # (border,)
-    g: tags.Scratch[F2]  # (nb + 1, 6) right side, then solution
+    g: tags.Scratch[F2]  # (nodes + 1, 6) right side, then solution
     rate: tags.Scratch[F2]  # (nb, 6) change of velocities that residuals alone ask for
     extra: tags.Scratch[F2]  # (2, border) right side and solution
     work: tags.Scratch[F3]  # (4, 6, 6)
@@ -102,6 +114,9 @@ class Pair(NamedTuple):
     A: C3
     pivot: C3
     swap: I2
+    seen: F2
+    rows: I1
+    dense: I1
     B: C3
     answer: C3
     border: C2
@@ -158,6 +173,32 @@ def border_size(scene: Scene) -> int:
     return len(scene.equations.program) + len(scene.states.program)
 
 
+def _nodes(scene: Scene) -> tuple[np.ndarray, list[list[int]]]:
+    """Return the node of each equation, -1 for the border, and the bodies that each node holds.
+
+    Equations of one connection that hold the same bodies share a node. Those of contacts that stick
+    stay in the border: which bodies they hold changes.
+    """
+    eq, nb = scene.equations, len(scene.bodies.mass)
+    node, held = np.full(len(eq.program), -1, dtype=np.int64), list[list[int]]()
+    able = [e for e in range(len(node)) if eq.slot[e] < 0]
+    if len(able) < _MANY_EQUATIONS:
+        return node, held
+    last: tuple[int, tuple[int, ...]] = (-1, ())
+    rows = 0
+    for e in able:
+        terms = slice(int(eq.first[e]), int(eq.first[e + 1]))
+        bodies = scene.markers.body[np.concatenate((eq.i[terms], eq.j[terms]))]
+        those = sorted({int(b) for b in bodies if b < nb})
+        key = (int(eq.connection[e]), tuple(those))
+        if not held or key != last or rows == _ROWS:
+            held.append(those)
+            last, rows = key, 0
+        node[e] = nb + len(held) - 1
+        rows += 1
+    return node, held
+
+
 def make_tangent(scene: Scene, depends: Depends, pair: bool, stressed: bool = True) -> Tangent:
     """Return empty arrays for a scene.
 
@@ -166,9 +207,11 @@ def make_tangent(scene: Scene, depends: Depends, pair: bool, stressed: bool = Tr
     """
     nb, nt, m = len(scene.bodies.mass), len(scene.tree.body), border_size(scene)
     nz, n = len(scene.states.program), scene.rows.y.shape[1]
-    blocks = nb * nb if nb <= _ALL_COUPLED else min(nb * nb, _BLOCKS_A_BODY * nb)
-    joint, parent = np.full(nb, -1, dtype=np.int64), np.full(nb, -1, dtype=np.int64)
-    children = np.zeros(nb, dtype=np.int64)
+    node, held = _nodes(scene)
+    many = nb + len(held)
+    blocks = many * many if many <= _ALL_COUPLED else min(many * many, _BLOCKS_A_BODY * many)
+    joint, parent = np.full(many, -1, dtype=np.int64), np.full(many, -1, dtype=np.int64)
+    children = np.array([0] * nb + [len(those) for those in held], dtype=np.int64)
     for k in range(nt):
         if scene.tree.turn[k] != TURN_ROOT:
             joint[scene.tree.body[k]] = k
@@ -180,17 +223,22 @@ def make_tangent(scene: Scene, depends: Depends, pair: bool, stressed: bool = Tr
         return np.zeros(shape, dtype=np.int64)
 
     pattern = Pattern(
-        np.full((nb, nb), -1, dtype=np.int64),
+        np.full((many, many), -1, dtype=np.int64),
         whole(blocks, 2),
-        whole(nb),
-        whole(nb + 1),
+        whole(many),
+        whole(many + 1),
         whole(blocks),
         np.array([0, 0, 1], dtype=np.int64),
         joint,
         parent,
         children,
-        whole(nb),
-        whole(nb),
+        whole(many),
+        whole(many),
+        np.array([6] * nb + [0] * len(held), dtype=np.int64),
+        node,
+        np.array([b for those in held for b in those], dtype=np.int64),
+        np.cumsum([0, *map(len, held)], dtype=np.int64),
+        whole(len(node)),
     )
     linear = Linear(
         np.zeros((nb, 3, 3)),
@@ -226,9 +274,9 @@ def make_tangent(scene: Scene, depends: Depends, pair: bool, stressed: bool = Tr
         np.zeros((slots, 2)),
         np.zeros((2, 5 + wide)),
     )
-    sizes = nb, m, n, blocks, slots + 1, wide
+    sizes = nb, many, m, n, blocks, slots + 1, wide
     real = Real(*_factor_arrays(sizes, np.float64, Hook.MEMORY))
-    sizes = sizes if pair else (0, 0, 0, 0, 0, 0)
+    sizes = sizes if pair else (0, 0, 0, 0, 0, 0, 0)
     both = Pair(*_factor_arrays(sizes, np.complex128, Hook.MEMORY_PAIR))
     return Tangent(pattern, linear, keeps, depends, real, both)
 
@@ -242,19 +290,22 @@ def _carried(scene: Scene) -> tuple[int, int]:
 
 
 def _factor_arrays(
-    sizes: tuple[int, int, int, int, int, int], kind: type, hook: Hook
+    sizes: tuple[int, int, int, int, int, int, int], kind: type, hook: Hook
 ) -> tuple[np.ndarray, ...]:
     """Return the arrays of a factorisation."""
-    nb, m, n, blocks, slots, wide = sizes
+    nb, many, m, n, blocks, slots, wide = sizes
     return (
         np.zeros((blocks, 6, 6), dtype=kind),
-        np.zeros((nb, 6, 6), dtype=kind),
-        np.zeros((nb, 6), dtype=np.int64),
+        np.zeros((many, 6, 6), dtype=kind),
+        np.zeros((many, 6), dtype=np.int64),
+        np.zeros((many, 6)),
+        np.zeros(many, dtype=np.int64),
+        np.zeros(m + 1, dtype=np.int64),
         np.zeros((nb, 3, 3), dtype=kind),
-        np.zeros((m, nb, 6), dtype=kind),
+        np.zeros((m, many, 6), dtype=kind),
         np.zeros((m, m), dtype=kind),
         np.zeros(m, dtype=np.int64),
-        np.zeros((nb + 1, 6), dtype=kind),
+        np.zeros((many + 1, 6), dtype=kind),
         np.zeros((nb, 6), dtype=kind),
         np.zeros((2, m), dtype=kind),
         np.zeros((4, 6, 6), dtype=kind),

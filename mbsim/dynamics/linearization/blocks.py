@@ -3,7 +3,8 @@
 A body that hangs on a joint is xi_c = xi_p + S' dq: its columns and rows are added to those of
 its parent, the rows of dq, S times its own and what the joint's force adds (U), are eliminated.
 Children go before their parents, and among those that may go, the one with the fewest
-neighbours. Along a chain this is the articulated-body recursion, and as cheap.
+neighbours. Along a chain this is the articulated-body recursion, and as cheap. Multipliers of
+equations may be nodes as well (`Pattern.node`): they go after the bodies that these hold.
 
 The same code serves real and complex matrices: M is `Real` or `Pair` of `compile_model.tangent`.
 Loops over a block take its size from the array: unrolled, they would take long to compile.
@@ -14,7 +15,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mbsim.arrays.codes import BLOCK_COLUMN, BLOCK_ROW
-from mbsim.core.arrays import F2, I1, N1, N2
+from mbsim.core.arrays import F1, F2, I1, N1, N2
 from mbsim.core.jitable import jitable
 
 if TYPE_CHECKING:
@@ -26,15 +27,24 @@ COUPLINGS, BLOCKS, STALE = range(3)
 
 #: A pivot below this part of the largest number in its column counts as none.
 _NO_PIVOT = 1e-14
+#: A pivot of a node of multipliers below this part of its row's largest diagonal is not used.
+_LEFT = 1e-3
+
+
+@jitable
+def bodies_of(P: Pattern) -> int:
+    """Return how many nodes are bodies."""
+    return len(P.order) - len(P.first) + 1
 
 
 @jitable
 def forget_pattern(P: Pattern) -> None:
     """Start with the blocks of each body on itself."""
-    nb = len(P.order)
-    for a in range(nb):
-        for b in range(nb):
+    nb = bodies_of(P)
+    for a in range(len(P.order)):
+        for b in range(len(P.order)):
             P.block[a, b] = -1
+    for a in range(nb):
         P.block[a, a] = a
         P.pair[a, BLOCK_ROW] = P.pair[a, BLOCK_COLUMN] = a
     P.count[COUPLINGS] = nb
@@ -62,7 +72,7 @@ def couple(P: Pattern, a: int, b: int) -> bool:
 
 @jitable
 def drop_fill(P: Pattern) -> None:
-    """Take away the blocks that only elimination fills."""
+    """Take away the blocks of multipliers, and those that only elimination fills."""
     nb = len(P.order)
     for a in range(nb):
         for b in range(nb):
@@ -83,7 +93,7 @@ def place_block(P: Pattern, a: int, b: int) -> bool:
 
 @jitable
 def count_neighbours(P: Pattern, a: int) -> int:
-    """Return with how many bodies that are not yet eliminated body a is coupled."""
+    """Return with how many nodes that are not yet eliminated node a is coupled."""
     count = 0
     for b in range(len(P.order)):
         if b != a and P.waiting[b] >= 0 and P.block[a, b] >= 0:
@@ -92,8 +102,8 @@ def count_neighbours(P: Pattern, a: int) -> int:
 
 
 @jitable
-def next_body(P: Pattern) -> int:
-    """Return the body to be eliminated next."""
+def next_node(P: Pattern) -> int:
+    """Return the node to be eliminated next."""
     best, least = -1, len(P.order) + 1
     for a in range(len(P.order)):
         if P.waiting[a] == 0 and P.degree[a] < least:
@@ -102,24 +112,50 @@ def next_body(P: Pattern) -> int:
 
 
 @jitable
-def find_order(P: Pattern) -> bool:
-    """Find the order of elimination and the blocks that it fills; return whether there is room."""
-    nb = len(P.order)
+def place_known(P: Pattern) -> bool:
+    """Make room for what is coupled by joints and by equations; return whether there is room."""
+    nb = bodies_of(P)
     P.count[BLOCKS] = P.count[COUPLINGS]
-    for c in range(nb):
+    for c in range(len(P.order)):
         P.waiting[c] = P.children[c]
         if P.parent[c] >= 0:
             if not (place_block(P, c, P.parent[c]) and place_block(P, P.parent[c], c)):
                 return False
-    for c in range(nb):
+    for c in range(nb, len(P.order)):
+        if not place_block(P, c, c):
+            return False
+        for k in range(P.first[c - nb], P.first[c - nb + 1]):
+            if not (place_block(P, c, P.held[k]) and place_block(P, P.held[k], c)):
+                return False
+    return True
+
+
+@jitable
+def note_gone(P: Pattern, c: int) -> None:
+    """Let what waits for node c wait for it no longer."""
+    nb = bodies_of(P)
+    if P.parent[c] >= 0:
+        P.waiting[P.parent[c]] -= 1
+    for n in range(len(P.order) - nb):
+        for k in range(P.first[n], P.first[n + 1]):
+            P.waiting[nb + n] -= 1 if P.held[k] == c else 0
+
+
+@jitable
+def find_order(P: Pattern) -> bool:
+    """Find the order of elimination and the blocks that it fills; return whether there is room."""
+    many = len(P.order)
+    if not place_known(P):
+        return False
+    for c in range(many):
         P.degree[c] = count_neighbours(P, c)
     at = 0
-    for step in range(nb):
-        c = next_body(P)
+    for step in range(many):
+        c = next_node(P)
         P.order[step] = c
         P.start[step] = at
         P.waiting[c] = -1
-        for j in range(nb):
+        for j in range(many):
             if P.waiting[j] >= 0 and P.block[c, j] >= 0:
                 P.neighbour[at] = j
                 at += 1
@@ -128,11 +164,10 @@ def find_order(P: Pattern) -> bool:
             for j in range(first, at):
                 if not place_block(P, P.neighbour[i], P.neighbour[j]):
                     return False
-        if P.parent[c] >= 0:
-            P.waiting[P.parent[c]] -= 1
+        note_gone(P, c)
         for i in range(first, at):
             P.degree[P.neighbour[i]] = count_neighbours(P, P.neighbour[i])
-    P.start[nb] = at
+    P.start[many] = at
     P.count[STALE] = 0
     return True
 
@@ -299,15 +334,23 @@ def hang(P: Pattern, M: Real | Pair, linear: Linear, free: I1, c: int, first: in
 @jitable
 def eliminate(P: Pattern, M: Real | Pair, linear: Linear, free: I1) -> bool:
     """Replace A by its factors; return whether that is possible."""
+    nb = bodies_of(P)
+    for c in range(nb, len(P.order)):
+        for q in range(M.seen.shape[1]):
+            M.seen[c, q] = abs(M.A[P.block[c, c], q, q])
     for step in range(len(P.order)):
         c, first, end = P.order[step], P.start[step], P.start[step + 1]
-        size = 6
+        size = P.rows[c]
         if P.joint[c] >= 0:
             size = hang(P, M, linear, free, c, first, end)
         else:
-            copy_rows(M.pivot[c], M.A[P.block[c, c]], 6)
-        if not factor_small(M.pivot[c], M.swap[c], size):
+            copy_rows(M.pivot[c], M.A[P.block[c, c]], size)
+        if c >= nb:
+            if not factor_node(M.pivot[c], M.swap[c], M.seen[c], size):
+                size = 0
+        elif not factor_small(M.pivot[c], M.swap[c], size):
             return False
+        M.rows[c] = size
         for at in range(first, end):
             solve_rows(M.pivot[c], M.swap[c], size, M.A[P.block[c, P.neighbour[at]]])
         for at in range(first, end):
@@ -316,21 +359,44 @@ def eliminate(P: Pattern, M: Real | Pair, linear: Linear, free: I1) -> bool:
             for other in range(first, end):
                 j = P.neighbour[other]
                 take_product(M.A[P.block[i, j]], Q, M.A[P.block[c, j]], size)
+            if i >= nb:
+                see_diagonal(M.A[P.block[i, i]], M.seen[i])
+    return True
+
+
+@jitable
+def see_diagonal(A: N2, seen: F1) -> None:
+    """Keep the largest that each number of the diagonal was."""
+    for q in range(len(seen)):
+        seen[q] = max(seen[q], abs(A[q, q]))
+
+
+@jitable
+def factor_node(a: N2, swap: I1, seen: F1, size: int) -> bool:
+    """Replace a by its factors; return whether enough is left of what was `seen` of each row.
+
+    Bodies that were eliminated may be unable to move as an equation asks where others can, or the
+    loop folds. The border has the equations of such a node.
+    """
+    if not factor_small(a, swap, size):
+        return False
+    for k in range(size):
+        if not abs(a[k, k]) > _LEFT * seen[k]:
+            return False
     return True
 
 
 @jitable
 def solve_bodies(P: Pattern, M: Real | Pair, linear: Linear, free: I1, g: N2) -> None:  # noqa: C901
-    """Replace the right side g, (nb, 6) at least, by the displacements of all bodies.
+    """Replace the right side g, (nodes, 6) at least, by displacements of bodies and multipliers.
 
     Many branches because the sweeps forward and back both treat bodies on joints in their own way.
     """
-    nb = len(P.order)
-    for step in range(nb):
+    many = len(P.order)
+    for step in range(many):
         c, first, end = P.order[step], P.start[step], P.start[step + 1]
-        k, p, size = P.joint[c], P.parent[c], 6
+        k, p, size = P.joint[c], P.parent[c], M.rows[c]
         if k >= 0:
-            size = free[k]
             if p >= 0:
                 for i in range(g.shape[1]):
                     g[p, i] += g[c, i]
@@ -346,11 +412,9 @@ def solve_bodies(P: Pattern, M: Real | Pair, linear: Linear, free: I1, g: N2) ->
             for r in range(g.shape[1]):
                 for q in range(size):
                     g[i, r] -= Q[r, q] * g[c, q]
-    for step in range(nb - 1, -1, -1):
+    for step in range(many - 1, -1, -1):
         c, first, end = P.order[step], P.start[step], P.start[step + 1]
-        k, p, size = P.joint[c], P.parent[c], 6
-        if k >= 0:
-            size = free[k]
+        k, p, size = P.joint[c], P.parent[c], M.rows[c]
         for at in range(first, end):
             j = P.neighbour[at]
             X = M.A[P.block[c, j]]

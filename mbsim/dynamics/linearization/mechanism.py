@@ -201,6 +201,18 @@ def slopes_of_contacts(scene: Scene, what: int, t: float, h: float, y: F1) -> in
 
 
 @jitable
+def number_rows(scene: Scene, P: Pattern) -> None:
+    """Find the row of each equation in use in its node, where it has one."""
+    for c in range(len(scene.bodies.mass), len(P.rows)):
+        P.rows[c] = 0
+    for r in range(active_count(scene)):
+        c = P.node[scene.equations.active[r]]
+        if c >= 0:
+            P.at[r] = P.rows[c]
+            P.rows[c] += 1
+
+
+@jitable
 def find_couplings(scene: Scene, T: Tangent, t: float, y: F1) -> int:
     """Couple what acts on each other and order the bodies; return a code."""
     P = T.pattern
@@ -212,6 +224,7 @@ def find_couplings(scene: Scene, T: Tangent, t: float, y: F1) -> int:
             return code
         room = code == 0 and couple_applied(scene, P, T) and couple_equations(scene, P)
         if room and (P.count[STALE] == 0 or find_order(P)):
+            number_rows(scene, P)
             return 0
         # couplings of the past take the room of these
         drop_fill(P)

@@ -24,8 +24,8 @@ from mbsim.core.arrays import F1, F2, N1, N2, V3, Pointer
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, scale, sub, vector
 from mbsim.dynamics.contact.forces import contact_of, in_marker, sides
+from mbsim.dynamics.linearization.border import times_rate
 from mbsim.dynamics.linearization.contact_slopes import ask_friction
-from mbsim.dynamics.linearization.newton_matrix import times_rate
 from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT
 from mbsim.laws.abi import MEMORY_OUT, SIZE_OUT, STEP_IN, TIME_IN
 

@@ -34,15 +34,18 @@ from mbsim.core.arrays import N1, N2, V3
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
-from mbsim.core.rotation import add, cross, dot, rotate, sub, unrotate, vector
-from mbsim.dynamics.constraints.in_use import active_count
-from mbsim.dynamics.linearization.blocks import (
-    BLOCKS,
-    COUPLINGS,
-    eliminate,
-    factor_border,
-    solve_bodies,
-    solve_small,
+from mbsim.core.rotation import cross, rotate, unrotate, vector
+from mbsim.dynamics.linearization.blocks import BLOCKS, COUPLINGS, eliminate, solve_bodies
+from mbsim.dynamics.linearization.border import (
+    ask_nodes,
+    asked_of,
+    dense_count,
+    factor_rest,
+    fill_nodes,
+    list_border,
+    solve_border_part,
+    times_rate,
+    turn_residual,
 )
 
 if TYPE_CHECKING:
@@ -65,34 +68,6 @@ def fill_turns(T: Tangent, M: Real | Pair, h: float) -> None:
         B[1, 2] -= half * w[0]
         B[2, 0] -= half * w[1]
         B[2, 1] += half * w[0]
-
-
-@jitable
-def times_rate(L: Linear, M: Real | Pair, b: int, out: N2) -> None:
-    """Write E of body b, 6 x 6: rates of spin and of the point at O by xi.
-
-    spin: R B R' theta + theta x w; velocity of O's point: c1 (d + theta x r) - spin x r.
-    """
-    R, B, c1, w, r = L.R[b], M.B[b], M.c[0, C1], L.spin[b], L.r[b]
-    for j in range(B.shape[0]):
-        column = (R[j, 0], R[j, 1], R[j, 2])
-        # R B R' e_j
-        u0 = B[0, 0] * column[0] + B[0, 1] * column[1] + B[0, 2] * column[2]
-        u1 = B[1, 0] * column[0] + B[1, 1] * column[1] + B[1, 2] * column[2]
-        u2 = B[2, 0] * column[0] + B[2, 1] * column[1] + B[2, 2] * column[2]
-        e = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
-        around = cross(e, (w[0], w[1], w[2]))
-        s0 = R[0, 0] * u0 + R[0, 1] * u1 + R[0, 2] * u2 + around[0]
-        s1 = R[1, 0] * u0 + R[1, 1] * u1 + R[1, 2] * u2 + around[1]
-        s2 = R[2, 0] * u0 + R[2, 1] * u1 + R[2, 2] * u2 + around[2]
-        arm = cross(e, (r[0], r[1], r[2]))
-        out[0, j], out[1, j], out[2, j] = s0, s1, s2
-        out[3, j] = c1 * arm[0] - (s1 * r[2] - s2 * r[1])
-        out[4, j] = c1 * arm[1] - (s2 * r[0] - s0 * r[2])
-        out[5, j] = c1 * arm[2] - (s0 * r[1] - s1 * r[0])
-        for i in range(3):
-            out[i, 3 + j] = 0.0
-            out[3 + i, 3 + j] = c1 if i == j else 0.0
 
 
 @jitable
@@ -162,8 +137,9 @@ def fill_matrix(scene: Scene, T: Tangent, M: Real | Pair) -> None:
                 if part != 0.0:
                     for j in range(A.shape[1]):
                         A[i, j] -= part * E[q, j]
-    for b in range(len(P.order)):
+    for b in range(len(L.w)):
         add_inertia(scene, L, M, b, M.A[P.block[b, b]])
+    fill_nodes(scene, T, M)
 
 
 @jitable
@@ -183,165 +159,8 @@ def factor(scene: Scene, T: Tangent, M: Real | Pair, h: float) -> int:
     ask_memory(scene, M, Memory.FACTOR, M.r[0], M.r[1])
     if not eliminate(P, M, L, free):
         return Code.SINGULAR
+    list_border(scene, P, M)
     return factor_rest(scene, T, M)
-
-
-@jitable
-def bordered(scene: Scene, k: int) -> int:
-    """Return the row of `Linear.column` of the k-th unknown of the border."""
-    n = active_count(scene)
-    return k if k < n else len(scene.equations.program) + k - n
-
-
-@jitable
-def border_count(scene: Scene) -> int:
-    """Return the number of unknowns of the border: equations in use, then states."""
-    return active_count(scene) + len(scene.states.program)
-
-
-@jitable
-def along_row(L: Linear, M: Real | Pair, row: int, slope: int, x: N2) -> complex:
-    """Return a row of the border times displacements; of a state's slope with their rates."""
-    total = 0.0 * x[0, 0]
-    for b in range(len(L.w)):
-        for i in range(x.shape[1]):
-            if L.row[row, b, i] != 0.0:
-                total += L.row[row, b, i] * x[b, i]
-    if slope == 0:
-        return total
-    E = M.work[2]
-    for b in range(len(L.w)):
-        used = False
-        for i in range(x.shape[1]):
-            used = used or L.row_rate[row, b, i] != 0.0
-        if used:
-            times_rate(L, M, b, E)
-            for i in range(x.shape[1]):
-                for j in range(x.shape[1]):
-                    total += L.row_rate[row, b, i] * E[i, j] * x[b, j]
-    return total
-
-
-@jitable
-def wrench_at_cg(L: Linear, row: int, b: int) -> tuple[V3, V3]:
-    """Return force and torque, in body axes, of an equation's gradient on body b about its cg."""
-    C, r = L.column[row, b], vector(L.r[b])
-    force = (C[3], C[4], C[5])
-    torque = sub((C[0], C[1], C[2]), cross(r, force))
-    return force, unrotate(L.R[b], torque)
-
-
-@jitable
-def acceleration_row(L: Linear, M: Real | Pair, row: int, x: N2) -> complex:
-    """Return what displacements make of an equation's accelerations: C (c2 dx, c2/c1 B theta)."""
-    total, c2 = 0.0 * x[0, 0], M.c[0, C2]
-    ratio = c2 / M.c[0, C1]
-    for b in range(len(L.w)):
-        force, torque = wrench_at_cg(L, row, b)
-        theta = (x[b, 0], x[b, 1], x[b, 2])
-        shift = add((x[b, 3], x[b, 4], x[b, 5]), cross(theta, vector(L.r[b])))
-        turn = rotate(M.B[b], unrotate(L.R[b], theta))
-        total += c2 * dot(force, shift) + ratio * dot(torque, turn)
-    return total
-
-
-@jitable
-def level_of(scene: Scene, row: int) -> int:
-    """Return what an equation in use holds: 2 displacements, 1 velocities, 0 accelerations."""
-    return scene.equations.level[scene.equations.active[row]]
-
-
-@jitable
-def held_row(scene: Scene, L: Linear, M: Real | Pair, row: int, x: N2) -> complex:
-    """Return what displacements make of what an equation in use holds, as a displacement."""
-    level = level_of(scene, row)
-    if level == 2:
-        return along_row(L, M, row, 0, x)
-    total = along_row(L, M, row, 1, x)
-    if level == 1:
-        return total / M.c[0, C1]
-    return (total + acceleration_row(L, M, row, x)) / M.c[0, C2]
-
-
-@jitable
-def held_residual(scene: Scene, L: Linear, M: Real | Pair, row: int, r: N1) -> complex:
-    """Return what residuals make of the same."""
-    total, level = 0.0 * M.rate[0, 0], level_of(scene, row)
-    if level == 2:
-        return total
-    for b in range(len(L.w)):
-        for i in range(M.rate.shape[1]):
-            # M.rate is -e
-            total -= L.row_rate[row, b, i] * M.rate[b, i]
-    if level == 1:
-        return total / M.c[0, C1]
-    for b in range(len(L.w)):
-        force, torque = wrench_at_cg(L, row, b)
-        shift, turn = asked_of(L, M, b, r)
-        total += dot(force, shift) + dot(torque, turn)
-    return total / M.c[0, C2]
-
-
-@jitable
-def factor_rest(scene: Scene, T: Tangent, M: Real | Pair) -> int:
-    """Factor the border: what equations and states ask of the bodies."""
-    P, L = T.pattern, T.linear
-    active, size = active_count(scene), border_count(scene)
-    for k in range(size):
-        row, y = bordered(scene, k), M.answer[k]
-        for b in range(len(P.order)):
-            for i in range(y.shape[1]):
-                y[b, i] = L.column[row, b, i]
-        solve_bodies(P, M, L, scene.tree.free, y)
-    for k in range(size):
-        row = bordered(scene, k)
-        for other in range(size):
-            if k < active:
-                M.border[k, other] = held_row(scene, L, M, row, M.answer[other])
-                if L.released[k] == 1:
-                    # its multiplier is 0
-                    M.border[k, other] = 1.0 if k == other else 0.0
-                continue
-            M.border[k, other] = -along_row(L, M, row, 1, M.answer[other])
-            if other >= active:
-                M.border[k, other] -= L.slopes[k - active, other - active]
-            if other == k:
-                M.border[k, other] += M.c[0, C3]
-    factor_border(M.border, M.border_swap, size)
-    return 0
-
-
-@jitable
-def turn_residual(L: Linear, b: int, r: N1) -> tuple[complex, complex, complex]:
-    """Return rho of body b: twice the vector part of conj(q) r_q, q being of unit length."""
-    q, at = L.q[b], BODY_SIZE * b + 3
-    s0, s1, s2, s3 = r[at], r[at + 1], r[at + 2], r[at + 3]
-    return (
-        2.0 * (q[0] * s1 - q[1] * s0 - q[2] * s3 + q[3] * s2),
-        2.0 * (q[0] * s2 + q[1] * s3 - q[2] * s0 - q[3] * s1),
-        2.0 * (q[0] * s3 - q[1] * s2 + q[2] * s1 - q[3] * s0),
-    )
-
-
-@jitable
-def asked_of(
-    L: Linear, M: Real | Pair, b: int, r: N1
-) -> tuple[tuple[complex, complex, complex], tuple[complex, complex, complex]]:
-    """Return r_a and r_alpha of body b."""
-    at, form = BODY_SIZE * b, M.c[0, FORM].real
-    first = M.c[0, C1] if form == 0.0 else 0.0 * M.c[0, C1]
-    rho = turn_residual(L, b, r)
-    shift = (
-        first * r[at] + r[at + 7],
-        first * r[at + 1] + r[at + 8],
-        first * r[at + 2] + r[at + 9],
-    )
-    turn = (
-        first * rho[0] + r[at + 10],
-        first * rho[1] + r[at + 11],
-        first * rho[2] + r[at + 12],
-    )
-    return shift, turn
 
 
 @jitable
@@ -366,38 +185,13 @@ def ask_body(scene: Scene, L: Linear, M: Real | Pair, b: int, r: N1) -> None:
 def fill_right_side(scene: Scene, T: Tangent, M: Real | Pair, r: N1) -> None:
     """Fill g: what residuals ask of inertia and of forces by velocities."""
     P, L = T.pattern, T.linear
-    for b in range(len(P.order)):
+    for b in range(len(L.w)):
         ask_body(scene, L, M, b, r)
     for k in range(P.count[COUPLINGS]):
         a, b, D = P.pair[k, BLOCK_ROW], P.pair[k, BLOCK_COLUMN], L.D[k]
         for i in range(D.shape[0]):
             for j in range(D.shape[1]):
                 M.g[a, i] += D[i, j] * M.rate[b, j]
-
-
-@jitable
-def solve_border_part(scene: Scene, T: Tangent, M: Real | Pair, r: N1) -> None:
-    """Solve for multipliers and states, and add what they do to g, which holds displacements."""
-    P, L = T.pattern, T.linear
-    active, size = active_count(scene), border_count(scene)
-    x = M.extra[1]
-    for k in range(size):
-        row = bordered(scene, k)
-        if k < active:
-            x[k] = held_residual(scene, L, M, row, r) - held_row(scene, L, M, row, M.g)
-            if L.released[k] == 1:
-                x[k] = 0.0 * x[k]
-            continue
-        at = scene.states.offset[k - active]
-        x[k] = r[at] + along_row(L, M, row, 1, M.g)
-        for b in range(len(P.order)):
-            for i in range(M.rate.shape[1]):
-                x[k] += L.row_rate[row, b, i] * M.rate[b, i]
-    solve_small(M.border, M.border_swap, size, x)
-    for k in range(size):
-        for b in range(len(P.order)):
-            for i in range(M.g.shape[1]):
-                M.g[b, i] += M.answer[k, b, i] * x[k]
 
 
 @jitable
@@ -425,6 +219,7 @@ def solve(scene: Scene, T: Tangent, M: Real | Pair, r: N1, d: N1) -> int:
     """Solve for the residual r; r and d (n,) in the layout of y."""
     fill_right_side(scene, T, M, r)
     ask_memory(scene, M, Memory.RIGHT, r, d)
+    ask_nodes(scene, T, M, r)
     solve_bodies(T.pattern, M, T.linear, scene.tree.free, M.g)
     solve_border_part(scene, T, M, r)
     for k in range(BODY_SIZE * len(scene.bodies.mass), len(d)):
@@ -432,7 +227,7 @@ def solve(scene: Scene, T: Tangent, M: Real | Pair, r: N1, d: N1) -> int:
         d[k] = r[k] / M.c[0, C3]
     ask_memory(scene, M, Memory.RECOVER, r, d)
     write_answer(scene, T, M, r, d)
-    active = active_count(scene)
+    dense = dense_count(M)
     for z in range(len(scene.states.program)):
-        d[scene.states.offset[z]] = M.extra[1, active + z]
+        d[scene.states.offset[z]] = M.extra[1, dense + z]
     return 0

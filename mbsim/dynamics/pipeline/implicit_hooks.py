@@ -24,9 +24,8 @@ from mbsim.dynamics.linearization.contact_slopes import (
     resist_tilting,
 )
 from mbsim.dynamics.linearization.element_slopes import add_all_residual_slopes
-from mbsim.dynamics.linearization.expression_slopes import fill_state_slopes
+from mbsim.dynamics.linearization.expression_slopes import add_motion_rows, fill_state_slopes
 from mbsim.dynamics.linearization.mechanism import add_bends, linearise
-from mbsim.dynamics.linearization.motion_slopes import add_motion_rows
 from mbsim.dynamics.linearization.newton_matrix import factor, solve
 
 
