@@ -59,15 +59,20 @@ def settings(
 ) -> list[Setting]:
     """Return all settings of a scene; no `integrators` or `tolerances` means the scene's own.
 
-    A variation with a step `h` is MOREAU's alone, which takes fixed steps.
+    A variation with a step `h` is MOREAU's alone, which takes fixed steps. Of those that differ in
+    the stiffness `k` alone it runs the first: contacts are rigid to it.
     """
-    return [
-        Setting(integrator, tol, variation)
-        for variation in scene.variations
-        for integrator in integrators or scene.integrators or able(scene.deck(variation))
-        if "h" not in variation or integrator == "MOREAU"
-        for tol in (tolerances or scene.tolerances)
-    ]
+    found, rigid = list[Setting](), set[frozenset[tuple[str, float]]]()
+    for variation in scene.variations:
+        those = frozenset((name, value) for name, value in variation.items() if name != "k")
+        for integrator in integrators or scene.integrators or able(scene.deck(variation)):
+            nonsmooth = integrator == "MOREAU"
+            if those in rigid if nonsmooth else "h" in variation:
+                continue
+            if nonsmooth:
+                rigid.add(those)
+            found += [Setting(integrator, tol, variation) for tol in tolerances or scene.tolerances]
+    return found
 
 
 @functools.lru_cache(maxsize=64)

@@ -317,6 +317,19 @@ def test_peaks_of_all_steps_count_beside_the_rows():
 # --- our settings and the growth with the number of spheres
 
 
+@pytest.mark.parametrize("name", ["S7_1000", "drum_300"])
+def test_moreau_runs_once_for_all_stiffnesses_and_once_for_each_step(name):
+    scene = all_scenes()[name]
+    those = [s for s in own.settings(scene, ["MOREAU"], [1e-2])]
+    steps = {v["h"] for v in scene.variations if "h" in v}
+    assert sum("h" not in s.variation for s in those) == 1
+    assert sorted(s.variation["h"] for s in those if "h" in s.variation) == sorted(steps)
+    stiffnesses = {v["k"] for v in scene.variations}
+    others = own.settings(scene, ["VERLET"], [1e-2])
+    assert {s.variation["k"] for s in others} == stiffnesses
+    assert len(stiffnesses) > 1
+
+
 def test_integrators_are_those_of_the_scene_unless_asked_for():
     scenes = all_scenes()
 
