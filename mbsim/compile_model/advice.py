@@ -7,6 +7,7 @@ body and of those that stand above it. Bodies with joints are left out, as joint
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
@@ -34,6 +35,11 @@ MOST_PAIRS = 4_000_000
 UPRIGHT = 1e-6
 #: Overlap at the start, over a width, that is none but rounding.
 TOUCHING = 1e-6
+#: Tangent of an incline below which a plane is level.
+LEVEL = 1e-9
+#: Cosine of a cylinder's axis to a plane's normal from which on it stands on its end.
+STANDING = 0.99
+_OF_REVOLUTION = ("CYLINDER", "FRUSTUM")
 _ONE_POINT = ("SPHERE", "ELLIPSOID")
 
 
@@ -147,7 +153,7 @@ def _creep(contact: Contact, meetings: list[_Meeting], units: Units) -> Iterator
     if law is None or law.memory or law.of_area or contact.asks_user:
         return
     steep = max(
-        (each for each in meetings if each.load > 0.0 and each.slope > 1e-9),
+        (each for each in meetings if each.load > 0.0 and each.slope > LEVEL),
         key=lambda each: each.slope,
         default=None,
     )
@@ -189,6 +195,10 @@ class _Weights:
         self.size = float(np.linalg.norm(self.g))
         self.up = -self.g / self.size if self.size > 0.0 else np.zeros(3)
         self.joined = _joined(model, self.at)
+        sides = [(c.i_graphics_id, c.j_graphics_id) for c in model.contacts.values()]
+        touching = {id for both in sides for side in both for id in side}
+        #: How many shapes that contacts name each body has.
+        self.shapes = Counter(self._body(id) for id in touching)
         self.on_others: set[int] = set()
         self.carried = self._columns() if self.size > 0.0 else {}
 
@@ -258,11 +268,38 @@ class _Weights:
             meeting = meeting._replace(load=load, slope=math.nan)
         elif cosine > UPRIGHT:
             slope = math.sqrt(max(0.0, 1.0 - cosine * cosine)) / cosine
+            if slope > LEVEL and self._is_wedged(i, normal):
+                load, slope = 0.0, math.nan  # each of several planes carries what is not known
+            elif self._rolls(shapes[0], normal):
+                slope = math.nan
             meeting = meeting._replace(load=load * cosine, slope=slope)
         size = meeting.width if math.isfinite(meeting.width) else 0.0
         return meeting._replace(
             speed=self._speed(bodies, normal, gap if abs(gap) > TOUCHING * size else 0.0)
         )
+
+    def _rolls(self, shape: Graphic, normal: Array) -> bool:
+        """Return whether a shape, the only one of its body, rolls on a plane rather than slides."""
+        if self.shapes[self.at.markers[shape.marker_id].body_id] > 1:
+            return False  # a wheel, a foot: what the others do is not known
+        if shape.shape in _OF_REVOLUTION:
+            return abs(float(self.at.markers[shape.marker_id].R[:, 2] @ normal)) < STANDING
+        return shape.shape in _ONE_POINT
+
+    def _is_wedged(self, graphic: int, normal: Array) -> bool:
+        """Return whether the body of a graphic touches a plane of another normal at the start."""
+        body, graphics = self._body(graphic), self.model.graphics
+        for contact in self.model.contacts.values():
+            sides = contact.i_graphics_id, contact.j_graphics_id
+            for own, others in (sides, sides[::-1]):
+                planes = [graphics[j] for j in others if graphics[j].shape == "PLANE"]
+                for shape in [graphics[i] for i in own if planes and self._body(i) == body]:
+                    for plane in planes:
+                        other, gap = self._gap([shape, plane])
+                        near = gap <= TOUCHING * 2.0 * _half_width(shape)
+                        if other is not None and near and float(other @ normal) < 1.0 - LEVEL:
+                            return True
+        return False
 
     def _load(self, bodies: list[BodyPlace | None]) -> float:
         """Return what the upper one of two bodies brings down on the lower one."""
