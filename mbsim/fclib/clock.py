@@ -99,9 +99,22 @@ def loading() -> Iterator[None]:
 
 
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function compiled (`jit.function`); finding its cache is loading, too."""
+    """Return a function compiled (`jit.function`); what its first call needs is loading, too."""
     found = _seen.get(function)
     if found is None:
         with loading():
             found = _seen[function] = jit.function(function)
+        # looking at arguments of a new kind, and getting the code for them
+        for name in ("typeof_pyval", "_compile_for_args"):
+            setattr(found, name, _left_out(getattr(found, name)))
     return found
+
+
+def _left_out(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function whose seconds are left out."""
+
+    def called(*arguments: Any, **options: Any) -> Any:
+        with loading():
+            return function(*arguments, **options)
+
+    return called
