@@ -47,7 +47,9 @@ def command(file: Path, plugins: tuple[Path, ...], as_json: bool) -> None:
         about = _about_table(file)
     else:
         from mbsim.reader.xml import read_model
+        from mbsim.run.preparing import check_plugins
 
+        check_plugins(plugins)
         deck = read_model(file)
         about = _about_model(deck, plugins)
         warn(deck.warnings)

@@ -52,8 +52,10 @@ def command(
     from mbsim.laws.slip_test import Conditions, described
     from mbsim.results.drawing import check_target, draw, need_matplotlib, save
     from mbsim.results.law_curves import law_picture
+    from mbsim.run.preparing import check_plugins
 
     need_matplotlib()
+    check_plugins(plugins)
     names = tuple(dict.fromkeys(laws))
     target = output or Path(f"friction-{'+'.join(names).lower()}.png")
     check_target(target)

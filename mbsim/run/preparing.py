@@ -78,13 +78,14 @@ def prepare(
         "compiling what this model needs (a quarter of a minute to one); later runs load it"
     )
     jit.compiled = jit.expected = 0
-    jit.on_plan = lambda: tell(f"compiling: {jit.expected - jit.compiled} functions are left")
+    jit.on_plan = lambda: tell(_left(jit.expected - jit.compiled))
     check_plugins(files)
     said: list[str] = []
     with no_scripts(not scripts), part("build"):
         system = build(with_plants(model), files, interpret, detector, said.append)
     changes = _parameters(system, settings)
     said += _announce(system, settings, said, tell)
+    said += _unused(system, files, tell)
     return Prepared(
         system, said, _attributes(system, settings, detector, files, interpret), changes
     )
@@ -126,6 +127,27 @@ def _announce(system: System, settings: Settings, said: list[str], tell: Notify)
         )
         tell(more[-1])
     return more
+
+
+def _left(count: int) -> str:
+    """Return how many functions are still to be compiled, in words."""
+    return f"compiling: {count} functions are left" if count != 1 else "compiling: one is left"
+
+
+def _unused(system: System, files: Sequence[Path], tell: Notify) -> list[str]:
+    """Tell which files of `plugins` no element calls; return the lines, for the log as well."""
+    called = {user.source.absolute() for _, user in system.user_laws}
+    called |= {post.source.absolute() for post in system.posts}
+    called |= {user.source.absolute() for user in system.subroutines.values()}
+    called |= {user.source.absolute() for user in system.residuals.values()}
+    unused = [
+        f"--plugin {file}: no element calls a function of it"
+        for file in files
+        if file.absolute() not in called
+    ]
+    for line in unused:
+        tell(line)
+    return unused
 
 
 def _attributes(
