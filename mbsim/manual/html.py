@@ -17,10 +17,10 @@ from markdown_it.renderer import RendererHTML
 from markdown_it.token import Token
 
 from mbsim import __version__
-from mbsim.errors import ResultsError
 from mbsim.manual.book import INDEX, PAGES, Page, pages
 from mbsim.manual.mathematics import to_mathml
 from mbsim.manual.search import EMPTY, NOTES, SYNONYMS
+from mbsim.results.products import write_product
 
 _STATIC = Path(__file__).parent / "static"
 _LEXERS = {"console": "console", "xml": "xml", "python": "python", "c": "c", "toml": "toml"}
@@ -29,11 +29,8 @@ _COMMENT = re.compile(r"<!--.*?-->\s*", re.DOTALL)
 
 
 def write(file: Path) -> None:
-    """Write the manual; ResultsError where the file cannot be written."""
-    try:
-        file.write_text(document(), encoding="utf-8")
-    except OSError as error:
-        raise ResultsError(f"{file}: {error.strerror}") from None
+    """Write the manual; `write_product` says what is raised."""
+    write_product(file, document(), "page", "--html")
 
 
 def document() -> str:

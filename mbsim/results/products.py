@@ -27,6 +27,10 @@ _KINDS: dict[str, Callable[[bytes], bool]] = {
 }
 
 
+#: How a file of a kind ends, where no other program could tell what it is.
+_ENDINGS = {"page": (".html", ".htm"), "glTF model": (".glb",)}
+
+
 def is_kind(path: Path, kind: str) -> bool:
     """Return whether a file is of a kind, by what it holds; an empty one may be replaced.
 
@@ -46,6 +50,9 @@ def check_product(path: Path, kind: str, option: str = "-o") -> None:
     """Raise `ModelError` unless a product of this kind may be written there."""
     if path.is_dir():
         raise ModelError(f"{option} {path}: is a folder; give a file in it")
+    endings = _ENDINGS.get(kind, ())
+    if endings and path.suffix.lower() not in endings:
+        raise ModelError(f"{option} {path}: a {kind}; the name must end in {' or '.join(endings)}")
     # a link that leads nowhere, or to itself, is replaced
     if path.exists() and not is_kind(path, kind):
         raise ModelError(f"{option} {path}: is there and is no {kind}; it is left alone")
