@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mbsim.cli.messages import echo, print_json
+from mbsim.cli.messages import counted, echo, print_json
 from mbsim.cli.options import json_option
 
 if TYPE_CHECKING:
@@ -436,7 +436,7 @@ def _show_solved(entry: dict[str, Any], reason: str) -> None:
     status = entry["status"].replace("_", " ")
     echo(
         f"{entry['file']}: {status} by {entry['solver']} in {1e3 * entry['solve_s']:.3f} ms, "
-        f"{entry['iterations']} iterations" + (f" ({reason})" if reason else "")
+        f"{counted(entry['iterations'], 'iterations')}" + (f" ({reason})" if reason else "")
     )
     echo(
         f"  error {entry['error']:.2e}, over |q| {entry['error_q']:.2e}, scale-free "

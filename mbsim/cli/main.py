@@ -59,6 +59,21 @@ class Commands(click.Group):
         command.epilog = f"More: mbsim manual {cmd_name}"
         return command
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the subcommand; of a name that is none the nearest is said."""
+        try:
+            return super().resolve_command(ctx, args)
+        except click.UsageError as error:
+            import difflib
+
+            near = difflib.get_close_matches(args[0], COMMANDS, n=1)
+            if near:
+                said = f"{error.message} Did you mean {near[0]}?"
+                raise click.UsageError(said, ctx) from None
+            raise
+
     def main(self, *args: Any, **options: Any) -> Any:
         """Run a command line, standard streams that are closed being those of the null device.
 

@@ -291,7 +291,8 @@ def parse(text: str) -> Expression:
         made: Any = parser.parse(text)
     except UnexpectedCharacters as fault:
         at = fault.pos_in_stream or 0
-        raise ExpressionError(f"{text[at]!r} means nothing here", at + 1) from None
+        shown = f"'{text[at]}'" if text[at].isprintable() else repr(text[at])
+        raise ExpressionError(f"{shown} means nothing here", at + 1) from None
     except UnexpectedToken as fault:
         raise _unexpected(text, fault.token, set(fault.accepts or fault.expected)) from None
     return Expression(text, made.node)

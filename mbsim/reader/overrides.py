@@ -119,12 +119,17 @@ def _set(node: Node, name: str, value: str, origin: str, known: list[str] | None
     if found is not None:
         found.value, found.origin = value, origin
         return
+    _check_known(node, name, known)
+    node.attributes.append(Attribute(name, value, node.line, origin))
+
+
+def _check_known(node: Node, name: str, known: list[str] | None) -> None:
+    """Raise LookupError for an attribute that the statement does not have."""
     if known is not None and fold(name) not in {fold(word) for word in known}:
         close = nearest(name, known)
         raise LookupError(
             f"{node.tag} has no attribute {name}{close or '; known: ' + ', '.join(known)}"
         )
-    node.attributes.append(Attribute(name, value, node.line, origin))
 
 
 def value_of(sections: Sequence[Node], name: str) -> str | None:
@@ -140,7 +145,10 @@ def value_of(sections: Sequence[Node], name: str) -> str | None:
         raise ModelError(f"{name}: must be Element[id].attribute")
     element, index, turn, attribute, _ = match.groups()
     try:
-        found = _find(sections, element, index, int(turn or 1)).find(attribute)
+        node = _find(sections, element, index, int(turn or 1))
+        found = node.find(attribute)
+        if found is None:
+            _check_known(node, attribute, known_attributes(node))
     except LookupError as error:
         raise ModelError(f"{name}: {error.args[0]}") from None
     return found.value if found is not None else None

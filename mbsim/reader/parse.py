@@ -36,6 +36,8 @@ _ENCODINGS = {
 }
 #: Blanks that XML takes for letters.
 _ODD_BLANKS = re.compile("[\u00a0\u1680\u2000-\u200a\u202f\u205f\u3000]")
+#: First bytes of what is no text, and what it then is.
+_RESULTS = {b"\x89HDF\r\n\x1a\n": "an HDF5 file", b"PAR1": "a Parquet table"}
 _DECLARATION = re.compile(rb"<\?xml[^>]*?encoding\s*=\s*[\"']([^\"']*)[\"']")
 _BEFORE_ROOT = re.compile(r"(?:\s+|<!--.*?-->|<\?.*?\?>)*", re.DOTALL)
 _TAG = re.compile(
@@ -178,8 +180,16 @@ def _refused(file: str, line: int, message: str) -> DeckError:
     return DeckError([Fault(file, line, "", message)])
 
 
+def refuse_results(data: bytes, file: str) -> None:
+    """Raise `DeckError` where a file is one of those that runs and studies write."""
+    for mark, kind in _RESULTS.items():
+        if data.startswith(mark):
+            raise _refused(file, 1, f"{kind}, not a deck; mbsim info shows what is in results")
+
+
 def _decode(data: bytes, file: str) -> str:
     """Return the deck as text; the encoding is that of its byte order mark or declaration."""
+    refuse_results(data, file)
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         name = "utf-16"
     else:

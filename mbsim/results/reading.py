@@ -396,8 +396,10 @@ def open_results(path: str | Path) -> Results:
         opened.close()
         raise ResultsError(f"{file}: {said_of(error)}") from None
     if not ours:
+        problem = any(str(name).startswith("fclib_") for name in opened)
         opened.close()
-        raise ResultsError(f"{file}: is HDF5, but not a result file of mbsim")
+        hint = "; mbsim fclib info shows such a contact problem" if problem else ""
+        raise ResultsError(f"{file}: is HDF5, but not a result file of mbsim{hint}")
     return Results(opened, file)
 
 

@@ -12,6 +12,8 @@ from mbsim.errors import ModelError
 from mbsim.results.names import PARTS, is_pattern, nearest
 
 Table = np.ndarray[Any, Any]
+#: Names that a message lists; more would hide it.
+_MOST_NAMED = 12
 _PARTS = {"mag", *(part for parts in PARTS.values() for part in parts)}
 
 
@@ -66,10 +68,16 @@ class SignalFilter:
             if any(_asks(wanted, segments) for segments in split):
                 continue
             near = [] if is_pattern(pattern) else nearest(pattern, known)
-            hint = f"; did you mean {' or '.join(near)}?" if near else ""
+            hint = f"; did you mean {' or '.join(near)}?" if near else _there(known)
             faults.append(f"--signals {pattern}: this model has no such signal{hint}")
         if faults:
             raise ModelError("\n".join(faults))
+
+
+def _there(known: Sequence[str]) -> str:
+    """Return which signals there are, the first of many."""
+    more = f" and {len(known) - _MOST_NAMED} more" if len(known) > _MOST_NAMED else ""
+    return f"; there is {', '.join(sorted(known)[:_MOST_NAMED])}{more}" if known else ""
 
 
 def _asks(pattern: Sequence[str], segments: Sequence[str]) -> bool:

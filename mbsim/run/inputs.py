@@ -200,7 +200,8 @@ class Inputs(MutableMapping[str, float]):
         if name in self._rows:
             return self._rows[name]
         near = nearest(name, self._rows)
-        hint = f"did you mean {' or '.join(near)}?" if near else f"there is {', '.join(self)}."
+        there = f"there is {', '.join(self)}." if self._rows else "there is none."
+        hint = f"did you mean {' or '.join(near)}?" if near else there
         if len(alike := self._labels.get(name, ())) > 1:
             hint = f"{' and '.join(alike)} have this label."
         raise ModelError(

@@ -79,7 +79,11 @@ def directions(system: System, options: Options) -> list[Direction]:
 
     found = []
     for name in options.sensitivity:
-        value = value_in(name, value_of(sections, name))
+        try:
+            text = value_of(sections, name)
+        except ModelError as error:
+            raise ModelError(f"sensitivity: {error}") from None
+        value = value_in(name, text)
         found.append(direction(name, value, built, system))
     return found
 

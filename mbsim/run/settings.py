@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, SupportsFloat
 
 import numpy as np
 
@@ -117,8 +117,10 @@ class Settings:
 
 def _checked(name: str, value: float, low: float, high: float) -> float:
     """Return a number given by the caller, or raise what is allowed."""
+    most = "finite" if math.isinf(high) else f"at most {high:g}"
+    if not isinstance(value, SupportsFloat):
+        raise ModelError(f"{name}={value!r} is not allowed: a number above {low:g}, {most}")
     if not low < value <= high or math.isinf(value):
-        most = "finite" if math.isinf(high) else f"at most {high:g}"
         raise ModelError(f"{name}={value:g} is not allowed: above {low:g}, {most}")
     return value
 

@@ -264,8 +264,15 @@ def check_signals(study: Study, system: System, key: str) -> list[str]:
     from mbsim.results.signals import names_of
 
     known = [*names_of(system), *(f"requests/{id}" for id in system.model.requests)]
+    # a contact's peaks are there where its other signals are
+    known += [
+        f"contacts/{id}/peak_{name}"
+        for id in system.model.contacts
+        for name in ("force", "penetration", "slip_speed")
+    ]
+    asked = sorted({output.signal for output in study.outputs if output.signal})
     try:
-        SignalFilter(study.signals).check(known)
+        SignalFilter(asked).check(known)
     except ModelError as error:
         return str(error).replace("--signals", key).split("\n")
     return []

@@ -82,6 +82,15 @@ def _compile(
         return 0, f"does not compile: {_first_words(error)}"
 
 
+#: The line of the user's script that a message of Numba's points at.
+_AT = re.compile(r'mbsim_plugin_\w+\.py", line \d+:\n(?:.*\n)*?(.*)\n\s*\^')
+#: An operator for which it has no whole lists: vectors are tuples in compiled code.
+_WHOLE = re.compile(r"No implementation of function Function\(<built-in function \w+>\)"
+                    r"[^\n]*\n\s*\n?\s*>>> \w+\([^\n]*Tuple\(")  # fmt: skip
+#: Beginnings of lines that say where, not what.
+_AROUND = ("Failed in", "During:", "There are", "File ", "raised from", "^", ">>>", "*", "Of which")
+
+
 def _first_words(error: Exception) -> str:
     """Return the telling line of one of Numba's long messages."""
     plain = re.sub(r"\x1b\[[0-9;]*m", "", str(error))
@@ -89,9 +98,19 @@ def _first_words(error: Exception) -> str:
         return "what it returns is no list of numbers"
     if "unify" in plain and "return type" in plain:
         return "branches return different kinds, as a list and a tuple: let all return a list"
+    at = _AT.findall(plain)
+    where = f" in {at[-1].strip()}" if at else ""
+    if "tuple index out of range" in plain:
+        return f"an index is beyond the last number{where}"
+    if _WHOLE.search(plain):
+        return f"arithmetic with a whole list, not with its numbers{where}"
     lines = [line.strip(" -") for line in plain.splitlines()]
-    telling = [line for line in lines if line and not line.startswith(("Failed in", "During:"))]
-    return f"{type(error).__name__}: {telling[0] if telling else ''}"[:200]
+    telling = [line for line in lines if line and not line.startswith(_AROUND)]
+    # the innermost of the functions that it could not make is what the script has
+    asked = [line for line in telling if line.startswith("No implementation of function")]
+    words = re.sub(r"Function\(<.*?(\w+)'?( at 0x\w+)?>\)", r"\1", (asked or telling or [""])[-1])
+    words = words.removesuffix(" found for signature:")
+    return f"{type(error).__name__}: {words}{where}"[:200]
 
 
 def _module(text: str) -> types.ModuleType:

@@ -49,7 +49,9 @@ def diagnose(data: bytes | str, path: str, error: Exception | None = None) -> st
         tree = ast.parse("\n".join(lines))
     except (SyntaxError, ValueError) as other:
         tree = None
-        faults.append((getattr(other, "lineno", None) or 1, str(getattr(other, "msg", other))))
+        line = getattr(other, "lineno", None) or 1
+        if line not in {place for place, _ in faults}:  # else it has been told in other words
+            faults.append((line, str(getattr(other, "msg", other))))
     if tree is not None:
         warned = [
             item for node in tree.body if isinstance(node, ast.FunctionDef)

@@ -11,7 +11,7 @@ from mbsim.reader.adm.lexer import split_statements, to_node
 from mbsim.reader.adm.statements import BY_KEY, NOT_BUILT, STATEMENTS
 from mbsim.reader.keywords import fold, nearest
 from mbsim.reader.overrides import apply_overrides
-from mbsim.reader.parse import MAX_BYTES, Node
+from mbsim.reader.parse import MAX_BYTES, Node, refuse_results
 from mbsim.reader.points import hold_points
 
 _NAMES = {statement.xml: statement.name for statement in STATEMENTS if statement.xml}
@@ -96,6 +96,7 @@ def _decode(data: bytes, file: str) -> str:
     """Return the deck as text, UTF-8 or else Latin-1."""
     if len(data) > MAX_BYTES:
         raise ModelError(f"{file}: larger than {MAX_BYTES // 2**20} MiB, the limit of a deck")
+    refuse_results(data, file)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
