@@ -124,6 +124,7 @@ class Motion(NamedTuple):
     before: F2  # (nb + 1, 6) velocity at the step's begin
     free: F2  # (nb + 1, 6) at its end, were there no contacts
     v: F2  # (nb + 1, 6) with them
+    guess: F2  # (nb, 6) as the last solution of the step had it, by which forces are
     full: F2  # (nb + 1, 6) with all rebound, see `rebound`
     work: F2  # (nb, 4) of contacts of the island of which a body is the first
     shift: F2  # (nb + 1, 6) displacement over the step's length
@@ -141,6 +142,7 @@ class Motion(NamedTuple):
     measured: I1  # (pairs,) 1 + list of near pairs in which its rows were measured, 0: none
     impulse: F1  # (ny,) impulses on bodies, then what they change of velocities
     middle: F1  # (ny,) state in the midst of a step
+    aside: F1  # (ny,) that, bodies moved along what an impact does to their ways
     half: F2  # (2, ny) states of a step's two halves, where it is compared with them
 
 
@@ -345,6 +347,7 @@ def make(
         before=numbers(nb + 1, 6),
         free=numbers(nb + 1, 6),
         v=numbers(nb + 1, 6),
+        guess=numbers(nb, 6),
         full=numbers(nb + 1, 6),
         work=numbers(nb, 4),
         shift=numbers(nb + 1, 6),
@@ -362,6 +365,7 @@ def make(
         measured=whole(pairs),
         impulse=numbers(ny),
         middle=numbers(ny),
+        aside=numbers(ny),
         half=numbers(2, ny),
     )
     points = no_points(m, nb, wide)

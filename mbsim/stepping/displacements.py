@@ -112,21 +112,32 @@ def spread_parts(scene: Scene, S: Stepping, count: int, h: float, slop: float) -
 
 
 @jitable
+def is_hit(S: Stepping, b: int) -> bool:
+    """Return whether an impact divides the way of a body that nothing else presses on."""
+    return S.motion.touch[b] != NO_IMPACT and S.motion.flies[b] != PRESSED
+
+
+@jitable
+def shift_of(S: Stepping, b: int, c: int) -> float:
+    """Return component c of a body's displacement over the step's length."""
+    M, part, bent = S.motion, S.motion.part[b], 0.0
+    if is_hit(S, b):
+        bent = 0.5 * part * part
+        if M.flies[b] == FLIES:
+            bent -= 0.5 * (1.0 - part) * (1.0 - part)
+    shift = part * M.before[b, c] + (1.0 - part) * M.v[b, c]
+    if bent != 0.0:
+        shift += bent * (M.free[b, c] - M.before[b, c])
+    return shift
+
+
+@jitable
 def fill_shift(scene: Scene, S: Stepping) -> None:
     """Fill displacements over the step's length."""
-    M = S.motion
     for k in range(bodies_awake(scene)):
         b = body_awake(scene, k)
-        part = M.part[b]
-        bent = 0.0
-        if M.touch[b] != NO_IMPACT and M.flies[b] != PRESSED:
-            bent = 0.5 * part * part
-            if M.flies[b] == FLIES:
-                bent -= 0.5 * (1.0 - part) * (1.0 - part)
         for c in range(6):
-            M.shift[b, c] = part * M.before[b, c] + (1.0 - part) * M.v[b, c]
-            if bent != 0.0:
-                M.shift[b, c] += bent * (M.free[b, c] - M.before[b, c])
+            S.motion.shift[b, c] = shift_of(S, b, c)
 
 
 @jitable

@@ -10,8 +10,9 @@ Newton's method on that, from a guess v_1, with the linearisation of implicit me
     v' = v_1 + A^-1 (v + h a_1 - v_1) + A^-1 M^-1 H' r,    A = 1 - theta h a_v - (theta h)^2 a_q
 
 so velocities without contacts and what impulses do to bodies are both A^-1 times what they are of
-explicit forces, and contacts know what the forces will be at the step's end. Two iterations are
-made: from v, and from the step that is found then. A is that of motions which joints allow: what
+explicit forces, and contacts know what the forces will be at the step's end. Iterations are made
+from v, from the step that is found then, and on until that settles (`step`): of what a stiff damper
+turns by within the step each leaves a part. A is that of motions which joints allow: what
 accelerations are across them is added as it is.
 
 theta is the least with which the stiffest of forces does not overshoot, 1 - 1/s of a damper of rate

@@ -24,6 +24,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.dynamics.bodies.awake import bodies_awake, body_awake, graphic_awake, graphics_awake
 from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics, plane_travel
+from mbsim.stepping.across import add_work_across, is_divided
 from mbsim.stepping.arrays import (
     ALL_BODIES,
     ALL_POINTS,
@@ -44,6 +45,7 @@ from mbsim.stepping.arrays import (
     SLOP,
     SLOWEST,
     STEP_LENGTH,
+    STIFFNESS,
     THETA,
     UNSOLVED,
     W_NN,
@@ -92,6 +94,8 @@ LET_GO = 100.0
 #: How often a step's contact problem is solved at most, each time with what bodies hit that the
 #: impulses threw at it.
 MOST_ATTEMPTS = 4
+#: How often it is solved by its midst at most, where stiff forces turn as bodies do.
+MOST_ROUNDS = 6
 
 
 @jitable
@@ -368,6 +372,45 @@ def solve_by_middle(scene: Scene, S: Stepping, t: float, h: float, y: F1, commit
 
 
 @jitable
+def has_settled(scene: Scene, S: Stepping, h: float) -> bool:
+    """Return whether velocities are those by which the forces of the step were found.
+
+    A damper of rate s/h takes s times the energy of what they are off by.
+    """
+    if not is_implicit(S):
+        return True
+    M, most = S.motion, noise_of(S, h) / math.sqrt(h * S.forces.number[STIFFNESS] + 1e-300)
+    for k in range(bodies_awake(scene)):
+        b = body_awake(scene, k)
+        length = scene.scales.length[scene.scales.group[b]]
+        for c in range(6):
+            off = abs(M.v[b, c] - M.guess[b, c])
+            if (off if c < 3 else off * length) > most:
+                return False
+    return True
+
+
+@jitable
+def solve_until_settled(
+    scene: Scene, S: Stepping, t: float, h: float, y: F1, committed: bool
+) -> int:
+    """Solve the step by its midst, again where stiff forces turn within it; return 0 or a code.
+
+    What Newton's method leaves of a velocity, times the damper across it, is a force that the
+    energy does not have.
+    """
+    code = 0
+    for _ in range(MOST_ROUNDS):
+        S.motion.guess[:] = S.motion.v[: len(S.motion.guess)]
+        code = solve_by_middle(scene, S, t, h, y, committed)
+        if code != 0 or S.rest.count[WOKEN] == 1:
+            return code
+        if has_settled(scene, S, h):
+            break
+    return code
+
+
+@jitable
 def solve_all(scene: Scene, S: Stepping, t: float, h: float, y: F1, committed: bool) -> int:
     """Solve the step with all points that its motion reaches; return 0 or a code."""
     for attempt in range(MOST_ATTEMPTS):
@@ -386,8 +429,34 @@ def solve_all(scene: Scene, S: Stepping, t: float, h: float, y: F1, committed: b
         if missed == 0:
             break
     if scene.world.hooks[Hook.APPLIED] != 0 or scene.world.hooks[Hook.JOINTS] != 0:
-        return solve_by_middle(scene, S, t, h, y, committed)
+        return solve_until_settled(scene, S, t, h, y, committed)
     return 0
+
+
+@jitable
+def move_on(scene: Scene, S: Stepping, t: float, h: float, y: F1, new: F1, committed: bool) -> int:
+    """Fill the state a step h after (t, y) that has been solved, and what was lost in it.
+
+    Return 0 or a code.
+    """
+    presses, code = S.tally.count[PRESSING] > 0, 0
+    for k in range(BODY_SIZE * len(scene.bodies.mass), len(y)):
+        new[k] = y[k] + h * S.motion.slope[k]
+    left = left_by_forces(scene, S, h)
+    if presses:
+        if is_divided(scene, S):
+            code = add_work_across(scene, S, t, h, new)
+            place_bodies(scene, y)
+        add_losses(scene, S, new)
+    move_bodies(scene, S, y, h, new)
+    keep_left(S, left + left_by_spins(scene, S, new), committed)
+    if presses and code == 0:
+        if presses_on_driven(scene, S):
+            code = add_work_of_motions(scene, S, t, h, y, new)
+        # impulses may throw bodies farther than was looked for
+        if not place_graphics(scene, new):
+            code = Code.TOO_FAR
+    return code
 
 
 @jitable
@@ -395,7 +464,6 @@ def take_step(
     scene: Scene, S: Stepping, t: float, h: float, y: F1, new: F1, committed: bool
 ) -> int:
     """Fill the state a step h after (t, y); return 0 or a code."""
-    dy = S.motion.slope
     if committed:
         for c in range(len(S.tally.deepest)):
             S.tally.deepest[c] = 0.0
@@ -419,17 +487,4 @@ def take_step(
             return code
     if S.plan.number[FIXED] == 0.0:
         keep_loads(S, S.tally.count[POINTS], committed)
-    for k in range(BODY_SIZE * len(scene.bodies.mass), len(y)):
-        new[k] = y[k] + h * dy[k]
-    left = left_by_forces(scene, S, h)
-    if S.tally.count[PRESSING] > 0:
-        add_losses(scene, S, new)
-    move_bodies(scene, S, y, h, new)
-    keep_left(S, left + left_by_spins(scene, S, new), committed)
-    if S.tally.count[PRESSING] > 0:
-        if presses_on_driven(scene, S):
-            code = add_work_of_motions(scene, S, t, h, y, new)
-        # impulses may throw bodies farther than was looked for
-        if not place_graphics(scene, new):
-            code = Code.TOO_FAR
-    return code
+    return move_on(scene, S, t, h, y, new, committed)
