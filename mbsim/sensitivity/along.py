@@ -8,6 +8,8 @@ changes and from there on (`changes`).
 
 from __future__ import annotations
 
+import math
+
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, view
 from mbsim.core.arrays import F1
@@ -20,16 +22,24 @@ from mbsim.sensitivity.arrays import (
     APART,
     ASKED,
     BEFORE,
+    BEGINS,
+    DOWN_SIDE,
+    ENDS,
     F_BEFORE,
+    FROM,
+    IS_LATER,
+    LONG,
     MOST,
+    MOST_PARTS,
     ODD,
     REMEMBERED,
     STRAIGHT,
     TWIN,
     UP,
+    WAY,
     Variations,
 )
-from mbsim.sensitivity.tableaus import LAST, OF_FIFTH, OF_THIRD, ORDER, A, C, E
+from mbsim.sensitivity.tableaus import DENSE, LAST, OF_FIFTH, OF_THIRD, ORDER, A, C, E
 from mbsim.sensitivity.twin import (
     keep_change,
     keep_depths,
@@ -44,11 +54,14 @@ SECOND, THIRD, WORK = FIRST + 1, FIRST + 2, FIRST + 7
 #: shortest part of a step.
 MANY_PARTS, PROGRESS, SHORTEST = 60, 0.01, 1e-9
 #: What the error of such a part may be, over that of a step.
-BENT_ENOUGH = 0.1
+BENT_ENOUGH = 0.2
 #: What is no longer taken for rounding.
 ROUGHEST = 1e-5
-#: Of a part of the step: begin and end of the stretch it is in, its length in the step's, its time.
-Span = tuple[float, float, float, float]
+#: A stretch of the step: its begin and end, and how its parts are taken.
+Span = tuple[float, float, int]
+#: Evenly; or the more slowly the nearer to its begin or end, where a touch begins or ends: forces
+#: are powers of depths that are no whole numbers, and bend smoothly over the root of the time.
+EVEN, SOFT_BEGIN, SOFT_END = range(3)
 #: Parts of a stretch by which its ends are left, until both sides of a difference touch alike.
 NEAREST, FARTHER = 1e-12, 4.0
 #: A difference is no smaller than this part of the usual one.
@@ -127,6 +140,30 @@ def clear_slope(
 
 
 @jitable
+def warp(way: int, q: float) -> float:
+    """Return at which part of a stretch its part q is as it is integrated."""
+    if way == SOFT_BEGIN:
+        return q * q
+    return 1.0 - (1.0 - q) * (1.0 - q) if way == SOFT_END else q
+
+
+@jitable
+def unwarp(way: int, part: float) -> float:
+    """Return what `warp` makes a part of a stretch of."""
+    if way == SOFT_BEGIN:
+        return math.sqrt(max(part, 0.0))
+    return 1.0 - math.sqrt(max(1.0 - part, 0.0)) if way == SOFT_END else part
+
+
+@jitable
+def pace(way: int, q: float) -> float:
+    """Return the derivative of `warp`."""
+    if way == SOFT_BEGIN:
+        return 2.0 * q
+    return 2.0 * (1.0 - q) if way == SOFT_END else 1.0
+
+
+@jitable
 def try_part(
     V: Variations,
     scene: Scene,
@@ -134,29 +171,37 @@ def try_part(
     h: float,
     k: int,
     span: Span,
-    s: float,
+    at: tuple[float, float],
     e: float,
     row: int,
     begun: bool,
 ) -> tuple[int, float]:
-    """Try a part of the step from s on; return a code, and the error over the derivative's size.
+    """Try a part of a stretch; return a code, and the error over the derivative's size.
 
-    By the method in a row of the tableaus. What it leads to is left in `work`; where the part has
-    begun its first slope is there already.
+    `at` says from where on, and how long. By the method in a row of the tableaus. What it leads to
+    is left in `work`; where the part has begun its first slope is there already. Slopes are those
+    over q.
     """
     w, d = V.work, V.next[k]
-    part, error, whole = span[3], 0.0, 1.0 / V.size[k]
-    last = LAST[row]
+    begin, end, way = span
+    q, part = at
+    error, whole = 0.0, 1.0 / V.size[k]
+    last, width = LAST[row], end - begin
     for stage in range(1 if begun else 0, last + 1):
         for i in range(len(d)):
             rise = 0.0
             for j in range(stage):
                 rise += A[row, stage, j] * w[FIRST + j, i]
             w[STAGE, i] = d[i] + part * rise
-        at = s + C[row, stage] * span[2]
-        code = clear_slope(V, scene, t, h, k, span[0], span[1], at, FIRST + stage, e)
+        x = q + C[row, stage] * part
+        faster, s = pace(way, x) * width * h, begin + warp(way, x) * width
+        code = 0
+        if faster > 0.0:
+            code = clear_slope(V, scene, t, h, k, begin, end, s, FIRST + stage, e)
         if code != 0:
             return code, 0.0
+        for i in range(len(d)):
+            w[FIRST + stage, i] = faster * w[FIRST + stage, i] if faster > 0.0 else 0.0
     for i in range(len(d)):
         off = 0.0
         for j in range(last + 1):
@@ -167,9 +212,68 @@ def try_part(
 
 
 @jitable
+def keep_part(
+    V: Variations, k: int, span: Span, q: float, part: float, later: float, row: int
+) -> None:
+    """Keep the polynomial of a part of a stretch that is taken, while there is room for it."""
+    at = V.parts[k]
+    V.parts[k] += 1
+    if at >= MOST_PARTS:
+        return
+    w, d, c, last = V.work, V.next[k], V.part[k * MOST_PARTS + at], LAST[row]
+    about = V.about[k * MOST_PARTS + at]
+    about[BEGINS], about[ENDS], about[WAY] = span[0], span[1], float(span[2])
+    about[FROM], about[LONG], about[IS_LATER] = q, part, later
+    for i in range(len(d)):
+        rise = w[STAGE, i] - d[i]
+        bend = part * w[FIRST, i] - rise
+        c[0, i], c[1, i], c[2, i] = d[i], rise, bend
+        c[3, i] = rise - part * w[FIRST + last, i] - bend
+        c[4, i] = 0.0
+        for j in range(last + 1):
+            c[4, i] += part * DENSE[row, j] * w[FIRST + j, i]
+
+
+@jitable
+def value_within(V: Variations, k: int, s: float) -> float:
+    """Write what is carried at the part s of the last step into `next`, of kept parts.
+
+    Return how much later it is there; NaN where it is not kept.
+    """
+    if V.parts[k] == 0 or V.parts[k] > MOST_PARTS:
+        return math.nan
+    at = k * MOST_PARTS
+    for j in range(V.parts[k]):
+        about = V.about[at]
+        way, width = int(about[WAY]), about[ENDS] - about[BEGINS]
+        if about[BEGINS] + warp(way, about[FROM] + about[LONG]) * width >= s:
+            break
+        if j + 1 < V.parts[k]:
+            at += 1
+    about, c = V.about[at], V.part[at]
+    way, width = int(about[WAY]), about[ENDS] - about[BEGINS]
+    q = unwarp(way, (s - about[BEGINS]) / width) if width > 0.0 else 1.0
+    x = min(max((q - about[FROM]) / about[LONG], 0.0), 1.0)
+    r = 1.0 - x
+    for i in range(V.next.shape[1]):
+        V.next[k, i] = c[0, i] + x * (c[1, i] + r * (c[2, i] + x * (c[3, i] + r * c[4, i])))
+    return about[IS_LATER]
+
+
+@jitable
 def is_too_much(V: Variations) -> bool:
     """Return whether derivatives have taken all the evaluations that they are worth."""
     return V.words[MOST] > 0 and V.words[ASKED] > V.words[MOST]
+
+
+@jitable
+def first_part(V: Variations, k: int, way: int, width: float, begun: bool) -> float:
+    """Return what part of a stretch is tried first; let a known first slope be one over q."""
+    if begun:
+        for i in range(V.next.shape[1]):
+            V.work[FIRST, i] *= pace(way, 0.0) * width
+    V.line[APART] = NEAREST
+    return min(1.0, V.lasted[k] / width) if way == EVEN and V.lasted[k] > 0.0 else 1.0
 
 
 @jitable
@@ -179,45 +283,56 @@ def integrate(
     t: float,
     h: float,
     k: int,
-    span: tuple[float, float],
+    span: Span,
     e: float,
     begun: bool,
+    later: float,
 ) -> int:
-    """Carry the derivative in `next` from one part of the step to another; return a code.
+    """Carry the derivative in `next` through a stretch of the step; return a code.
 
     By an explicit method, as exactly as `enough` asks. Where forces bend the steps get short. Its
-    first slope is left in `work`, of the end, as it may be there where the step has begun.
+    first slope is left in `work`, of the end, as it may be there where the step has begun. `later`
+    is kept with the polynomials of its parts.
     """
-    begin, end = span
-    w, d, s, part, most = V.work, V.next[k], begin, end - begin, V.enough[0]
-    tries, before, row = 0, begin, OF_THIRD if V.words[ALONG] == 1 else OF_FIFTH
+    begin, end, way = span
+    w, d, q, most = V.work, V.next[k], 0.0, V.enough[0]
+    width = (end - begin) * h
+    if width <= 0.0:
+        return 0
+    tries, before, row = 0, 0.0, OF_THIRD if V.words[ALONG] == 1 else OF_FIFTH
     if V.words[ALONG] == 0 and V.words[REMEMBERED] == 0:
         # forces of impacts bend there: what is left of places becomes speeds
         most *= BENT_ENOUGH
-    V.line[APART] = NEAREST
-    while s < end:
+    part = first_part(V, k, way, width, begun)
+    while q < 1.0:
         tries += 1
         if is_too_much(V):
             return Code.NOT_CONVERGED
         if tries % MANY_PARTS == 0:
-            if s - before < PROGRESS * (end - begin):
+            if q - before < PROGRESS:
                 # what is left is rounding of forces
                 most *= 10.0
                 if most > ROUGHEST:
                     return Code.NOT_CONVERGED
-            before = s
-        last = s + 1.0001 * part >= end
-        part = end - s if last else part
-        code, error = try_part(V, scene, t, h, k, (begin, end, part, part * h), s, e, row, begun)
+            before = q
+        last = q + 1.0001 * part >= 1.0
+        part = 1.0 - q if last else part
+        code, error = try_part(V, scene, t, h, k, span, (q, part), e, row, begun)
         if code != 0:
             return code
         begun = True
-        shortest = part <= SHORTEST or part * h <= 1e-15 * abs(t)
-        if error <= most or shortest:
+        longer = min(4.0, max(0.1, 0.9 * (most / max(error, 1e-12)) ** (1.0 / ORDER[row])))
+        if error <= most or part * width <= max(SHORTEST * h, 1e-15 * abs(t)):
+            keep_part(V, k, span, q, part, later, row)
             for i in range(len(d)):
                 d[i], w[FIRST, i] = w[STAGE, i], w[FIRST + LAST[row], i]
-            s = end if last else s + part
-        part *= min(4.0, max(0.1, 0.9 * (most / max(error, 1e-12)) ** (1.0 / ORDER[row])))
+            q = 1.0 if last else q + part
+            if way == EVEN:
+                V.lasted[k] = part * width * longer
+        part *= longer
+    faster = pace(way, 1.0) * width
+    for i in range(len(d)):
+        w[FIRST, i] = w[FIRST, i] / faster if faster > 0.0 else 0.0
     return 0
 
 
@@ -258,5 +373,5 @@ def remember_end(
             return code
         keep_depths(V, twin, side)
         keep_side(V, twin, scene, side)
-    keep_change(V, k, e)
+    keep_change(V, k, 2.0 * e, DOWN_SIDE)
     return 0

@@ -35,7 +35,11 @@ WORTH, MOST = 22, 23
 SET = 24
 # whether f is no function of time in the step that is taken, nor of what laws remember; -1: unknown
 STEADY = 25
-WORDS = 26
+# whether f of the run itself is known in the stages of the step that is taken; whether its path is
+PLAIN, FOLLOWED = 26, 27
+WORDS = 28
+#: Rows of `Variations.far` and `depth`: either side of a difference, and the run itself.
+UP_SIDE, DOWN_SIDE, OWN = range(3)
 #: Rows of `Variations.jump`: y before the commit, f before and behind it.
 BEFORE, F_BEFORE, F_BEHIND = range(3)
 #: Number of `Variations.line`: how far from the ends of a stretch of a step both sides of a
@@ -49,6 +53,11 @@ SHOWN_AT, SHOWN_LATER = range(2)
 UP_TO, DOWN_TO, BY = range(3)
 #: Number of `Variations.enough`: what an iteration may leave, over the derivative.
 LEFT = 1
+#: Numbers of a row of `Variations.about`: of the stretch that a part is in: begin, end and how its
+#: parts are taken; where the part begins in it and its length; how much later what is carried is.
+BEGINS, ENDS, WAY, FROM, LONG, IS_LATER = range(6)
+#: Parts of a step whose polynomials are kept.
+MOST_PARTS = 32
 #: Contacts that may begin or end within one step.
 MOST_CHANGES = 16
 
@@ -67,7 +76,9 @@ class Variations(NamedTuple):
     dense: F3  # (P, coefficients, n) of the last step, as `Method.dense`
     later: F2  # (P, 2) s of `later`: LAST_UNTIL, LAST_ON [T over the parameter's unit]
     next: tags.Scratch[F2]  # (P, n) derivative at the end of the step that is taken
-    far: tags.Scratch[F3]  # (2, ns, most) what laws make of their memory on either side
+    # (3, ns, most) what laws make of their memory on either side; of the run itself: OWN
+    far: tags.Scratch[F3]
+    plain: tags.Scratch[F2]  # (3, n) f of the run itself in the stages of an implicit step
     stage: tags.Scratch[F2]  # (STAGES, n) of an implicit method
     path: tags.Scratch[F2]  # (coefficients, n) polynomial of the run's step
     work: tags.Scratch[F2]  # (WORK, n) of `along`
@@ -75,12 +86,13 @@ class Variations(NamedTuple):
     enough: tags.Constant[F1]  # (2,) how large that may be; LEFT
     rate: F1  # (P,) how much smaller corrections of an implicit method's stages got, one by one
     bends: I1  # (P,) 1 where the last step was taken along the motion
+    bent: I1  # (P,) how many steps in a row were
     jump: tags.Scratch[F2]  # (3, n) see BEFORE
     middle: tags.Scratch[F3]  # (P, ns, most) mean of both sides behind a change of branch
     mode: tags.Scratch[F1]  # (ns,) `State.mode` before it
     reach: F1  # (P,) by how much a parameter may be changed for depths, 0: not known
     odd: tags.Scratch[I2]  # (2, ns) 1 where friction asks for another branch beside the run
-    depth: tags.Scratch[F2]  # (2, ns) how deep slots are at the end of a step on either side
+    depth: tags.Scratch[F2]  # (3, ns) how deep slots are at the end of a step, rows as of `far`
     # (2,) length of the straight line [T]; APART
     line: tags.Scratch[F1]
     # (P, ns + 1) by how much slots change their branch later, by the parameter; what else does last
@@ -92,9 +104,17 @@ class Variations(NamedTuple):
     own: tags.Scratch[F1]  # (n,) a derivative, while D + s f is in its place
     # (P, n) derivative at the begin of the last step, or at its last row where that was along it
     kept: tags.Scratch[F2]
+    # (P MOST_PARTS, 5, n) polynomials of parts of the last step that was taken along the motion, as
+    # `Method.dense`; (P MOST_PARTS, 6) see BEGINS; (P,) how many there are
+    part: tags.Scratch[F3]
+    about: tags.Scratch[F2]
+    parts: tags.Scratch[I1]
+    lasted: F1  # (P,) how long such a part may be that is tried first [T]
     shown: tags.Scratch[F2]  # (P, 2) where that is: SHOWN_AT, SHOWN_LATER
     change: tags.Scratch[F2]  # (MOST_CHANGES, 2) slots that begin or end to touch, at which part
     row: tags.Scratch[F2]  # (4, n) of a row of results: -, y beside it, its f, its derivative
+    # (2,) parts of usual steps of differences, and of the least ones, that those to one side take
+    one_sided: tags.Constant[F1]
     scale: tags.Constant[F1]  # (n,) usual size of a number of y
     room: tags.Constant[F1]  # (n,) by how much it may be changed for a difference
     weights: tags.Constant[F1]  # of an explicit method's stages; none where joints hold bodies

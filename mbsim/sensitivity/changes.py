@@ -13,13 +13,16 @@ from mbsim.core.address import call_int, view
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import ASK
-from mbsim.dynamics.contact.forces import BRANCH, FOUND_AT
+from mbsim.dynamics.contact.forces import BRANCH, DEPTH, FOUND_AT
 from mbsim.integrators.scheme import in_workspace
 from mbsim.laws.catalog import UNDECIDED
 from mbsim.sensitivity.along import (
+    EVEN,
     FIRST,
     POINT,
     SECOND,
+    SOFT_BEGIN,
+    SOFT_END,
     THIRD,
     UPPER,
     integrate,
@@ -40,6 +43,10 @@ from mbsim.sensitivity.twin import half_step, set_parameter
 
 #: A change is looked for within so many lengths of a step of where the run has it.
 FARTHEST = 100.0
+#: By how much farther than where its depth is 0 as a straight line a touch is looked for.
+NUDGE = 1e-3
+#: What is left is halved at every so manieth try at least.
+EVERY = 4
 #: Stands for a change of whatever branch where a slot is taken; those of single slots are below.
 ANY_BRANCH = -1
 #: A jump of f counts if what it does to y over the step is more than this part of the usual size.
@@ -103,13 +110,26 @@ def crossing(
             reach *= 8.0
         if reach >= FARTHEST:
             return math.nan
+    twin, tries, last, guess = view(V.words[TWIN], Scene), 0, math.nan, math.nan
+    depth, off = last, 0.0
     while True:
+        tries += 1
         middle = 0.5 * (low + high)
         if middle <= low or middle >= high or high - low < 1e-16:
             return high
+        if tries % EVERY != 0 and low < guess + off < high:
+            middle = guess + off
         found = touches(V, scene, t, h, k, middle, e, slot)
         if found < 0:
             return math.nan
+        if found == 1 and slot >= 0:
+            now = twin.work.slot[slot, DEPTH]
+            guess = middle - now * (middle - last) / (now - depth) if now != depth else math.nan
+            # a little farther, so that the other end of what is left comes near as well
+            off = NUDGE * (guess - middle)
+            last, depth = middle, now
+        elif middle == guess + off:
+            off = -off
         if found == before:
             low = middle
         else:
@@ -213,6 +233,31 @@ def pass_change(
 
 
 @jitable
+def through(
+    V: Variations,
+    scene: Scene,
+    t: float,
+    h: float,
+    k: int,
+    stretch: tuple[float, float, bool, bool],
+    e: float,
+    begun: bool,
+    later: float,
+) -> int:
+    """Carry the derivative in `next` through a stretch of the step; return a code.
+
+    Of a stretch its begin and end, and whether a contact begins at the one and ends at the other.
+    """
+    begin, end, touched, leaves = stretch
+    if touched and leaves:
+        middle = 0.5 * (begin + end)
+        code = integrate(V, scene, t, h, k, (begin, middle, SOFT_BEGIN), e, begun, later)
+        return code or integrate(V, scene, t, h, k, (middle, end, SOFT_END), e, True, later)
+    way = SOFT_BEGIN if touched else SOFT_END if leaves else EVEN
+    return integrate(V, scene, t, h, k, (begin, end, way), e, begun, later)
+
+
+@jitable
 def step_along(
     V: Variations,
     scene: Scene,
@@ -230,25 +275,26 @@ def step_along(
     is left there.
     """
     begin, until = span
-    e = half_step(V, k)
+    e, touched = half_step(V, k), False
     begun = goes_on and V.words[ALONG] == 1 and V.smooth[k] == 1
     code = add_motion(V, scene, t, h, begin, k, later)
     if begun:
         for i in range(V.next.shape[1]):
             V.work[FIRST, i] = V.slope[k, i]
     for j in range(V.words[CHANGES]):
-        end = V.change[j, 1]
+        end, begins = V.change[j, 1], scene.work.touching[int(V.change[j, 0])] == 1
         if end > until:
             break
         if end <= span[0] and span[0] > 0.0:
             continue
-        code = code or integrate(V, scene, t, h, k, (begin, end), e, begun)
+        stretch = (begin, end, touched, not begins)
+        code = code or through(V, scene, t, h, k, stretch, e, begun, later)
         if code == 0:
             code, later = pass_change(V, scene, t, h, k, j, later, e)
         if code != 0:
             return code, later
-        begin, begun = max(begin, end), False
-    code = code or integrate(V, scene, t, h, k, (begin, until), e, begun)
+        begin, begun, touched = max(begin, end), False, begins
+    code = code or through(V, scene, t, h, k, (begin, until, touched, False), e, begun, later)
     if goes_on:
         # what friction keeps is another number behind the step
         V.smooth[k] = 1 if begin < until and V.words[REMEMBERED] == 0 else 0

@@ -34,6 +34,7 @@ from mbsim.laws.catalog import BRANCHES, UNDECIDED
 from mbsim.sensitivity.arrays import (
     BEFORE,
     BY,
+    DOWN_SIDE,
     DOWN_TO,
     F_BEFORE,
     F_BEHIND,
@@ -159,7 +160,7 @@ def note_kept(V: Variations, scene: Scene, t: float, H: float, k: int) -> bool:
                 return False
             keep_side(V, twin, scene, side)
         if V.words[ODD] == 0:
-            keep_change(V, k, e)
+            keep_change(V, k, 2.0 * e, DOWN_SIDE)
             return True
         e, back = 0.3 * e, 3.0 * back
     return keep_one_side(V, scene, t, k)
@@ -176,7 +177,7 @@ def keep_one_side(V: Variations, scene: Scene, t: float, k: int) -> bool:
     for side in range(2):
         code = code or ask_beside(V, scene, t, k, e if side == 0 else -e, 0.0)
         keep_side(V, twin, scene, side)
-    keep_change(V, k, e)
+    keep_change(V, k, 2.0 * e, DOWN_SIDE)
     for s in range(V.far.shape[1]):
         # where both sides are on the other branch they differ as smoothly as on the run's
         if V.odd[0, s] == V.odd[1, s]:

@@ -15,18 +15,24 @@ from mbsim.integrators.scheme import SHOWN, Method, in_workspace
 from mbsim.sensitivity.arrays import (
     ATTEMPT,
     DOWN,
+    DOWN_SIDE,
     FIT_DENSE,
+    OWN,
     REMEMBERED,
     TWIN,
     UP,
+    UP_SIDE,
     Variations,
 )
 from mbsim.sensitivity.twin import (
     beside,
     half_step,
+    is_deep,
     keep_change,
     keep_depths,
+    keep_memory,
     keep_side,
+    one_side,
     set_parameter,
 )
 
@@ -54,14 +60,16 @@ def step_beside(
     if code == 0:
         code = call_int(V.words[ATTEMPT], (workspace, t, h, own.y, own.trial))
     keep_depths(V, twin, side)
+    keep_depths(V, scene, OWN)
     if code == 0 and V.words[REMEMBERED] > 0:
         keep_side(V, twin, scene, side)
+        keep_memory(V, scene, OWN)
     return code
 
 
 @jitable
-def error_of(V: Variations, up: Method, down: Method, part: float) -> float:
-    """Return the method's own estimate of the error of what lies between both sides, times part.
+def error_of(V: Variations, up: Method, other: Method, part: float) -> float:
+    """Return the method's own estimate of the error of what lies between both, times part.
 
     Two estimates are joined as DOP853 does: the larger one overrates the error by orders. It still
     counts a little, where forces bend.
@@ -69,13 +77,13 @@ def error_of(V: Variations, up: Method, down: Method, part: float) -> float:
     first = second = 0.0
     rows, stages = V.estimates.shape
     for i in range(len(V.scale)):
-        off = other = 0.0
+        off = low = 0.0
         for j in range(stages):
-            change = up.k[j, i] - down.k[j, i]
+            change = up.k[j, i] - other.k[j, i]
             off += V.estimates[0, j] * change
-            other += V.estimates[rows - 1, j] * change
+            low += V.estimates[rows - 1, j] * change
         first = max(first, part * abs(off) / V.scale[i])
-        second = max(second, part * abs(other) / V.scale[i])
+        second = max(second, part * abs(low) / V.scale[i])
     if rows == 1:
         return first
     return max(combined_error(first, second), LOW_ORDER * first)
@@ -84,49 +92,82 @@ def error_of(V: Variations, up: Method, down: Method, part: float) -> float:
 @jitable
 def explicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
     """Fill derivative k at the end of the step that is taken, and its error; return a code."""
-    e = half_step(V, k)
-    for side in range(2):
-        code = step_beside(V, scene, m, t, h, k, e if side == 0 else -e, side)
-        if code != 0:
-            return code
-    up, down = in_workspace(V.words[UP])[1], in_workspace(V.words[DOWN])[1]
-    part, whole, last = 0.5 / e, 1.0 / V.size[k], V.estimates.shape[1] - 1
-    for i in range(len(m.y)):
-        V.slope[k, i] = part * (up.k[last, i] - down.k[last, i])
-        if len(V.weights) > 0:
-            # what is rounded is the change alone
-            rise = 0.0
-            for j in range(len(V.weights)):
-                rise += V.weights[j] * (up.k[j, i] - down.k[j, i])
-            V.next[k, i] = V.d[k, i] + h * part * rise
-        else:
-            V.next[k, i] = part * (up.trial[i] - down.trial[i])
-        whole = max(whole, abs(V.next[k, i]) / V.scale[i], abs(V.d[k, i]) / V.scale[i])
-    V.error[k] = error_of(V, up, down, abs(h) * part / whole)
+    deep = is_deep(V, k)
+    e = half_step(V, k) if deep else one_side(V, m, k)
+    width = 2.0 * e if deep else e
+    code = step_beside(V, scene, m, t, h, k, e, UP_SIDE)
+    if deep and code == 0:
+        code = step_beside(V, scene, m, t, h, k, -e, DOWN_SIDE)
+    if code != 0:
+        return code
+    if deep:
+        take_difference(V, m, in_workspace(V.words[DOWN])[1], h, k, width)
+    else:
+        take_difference(V, m, m, h, k, width)
     if V.words[REMEMBERED] > 0:
         # what friction keeps is another number behind the step
-        keep_change(V, k, e)
+        keep_change(V, k, width, OWN)
     else:
         V.smooth[k] = 1
     return 0
 
 
 @jitable
-def fit_beside(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int, e: float) -> int:
-    """Fill the polynomials of the run's step, and of its derivative k; return a code.
+def take_difference(
+    V: Variations, m: Method, other: Method, h: float, k: int, width: float
+) -> None:
+    """Fill derivative k at the end of the step, and its error, from both sides of a difference."""
+    up = in_workspace(V.words[UP])[1]
+    whole, last = 1.0 / V.size[k], V.estimates.shape[1] - 1
+    for i in range(len(m.y)):
+        V.slope[k, i] = (up.k[last, i] - other.k[last, i]) / width
+        if len(V.weights) > 0:
+            # what is rounded is the change alone
+            rise = 0.0
+            for j in range(len(V.weights)):
+                rise += V.weights[j] * (up.k[j, i] - other.k[j, i])
+            V.next[k, i] = V.d[k, i] + h / width * rise
+        else:
+            V.next[k, i] = (up.trial[i] - other.trial[i]) / width
+        whole = max(whole, abs(V.next[k, i]) / V.scale[i], abs(V.d[k, i]) / V.scale[i])
+    V.error[k] = error_of(V, up, other, abs(h / width) / whole)
 
-    `e` is by how much the parameter was changed in the step on either side, which was just taken.
-    """
-    twin = view(V.words[TWIN], Scene)
-    for side in range(2):
-        set_parameter(V, twin, scene, k, e if side == 0 else -e)
-        own = in_workspace(V.words[UP + side])[1]
-        code = call_int(V.words[FIT_DENSE], (V.words[UP + side], t, h, own.y, own.trial))
-        if code != 0:
-            return code
-    up, down = in_workspace(V.words[UP])[1], in_workspace(V.words[DOWN])[1]
+
+@jitable
+def fit_path(V: Variations, scene: Scene, m: Method, t: float, h: float) -> int:
+    """Fill the polynomial of the run's step; return a code."""
+    own = in_workspace(V.words[DOWN])[1]
+    set_parameter(V, view(V.words[TWIN], Scene), scene, 0, 0.0)
+    own.memory[SHOWN] = 0.0
+    for i in range(len(m.y)):
+        own.y[i], own.trial[i] = m.y[i], m.trial[i]
+        for j in range(len(own.k)):
+            own.k[j, i] = m.k[j, i]
+    code = call_int(V.words[FIT_DENSE], (V.words[DOWN], t, h, own.y, own.trial))
     for j in range(V.dense.shape[1]):
         for i in range(len(m.y)):
-            V.dense[k, j, i] = 0.5 / e * (up.dense[j, i] - down.dense[j, i])
-            V.path[j, i] = 0.5 * (up.dense[j, i] + down.dense[j, i])
-    return 0
+            V.path[j, i] = own.dense[j, i]
+    return code
+
+
+@jitable
+def fit_beside(
+    V: Variations, scene: Scene, t: float, h: float, k: int, e: float, deep: bool
+) -> int:
+    """Fill the polynomial of derivative k of the run's step; return a code.
+
+    `e` is by how much the parameter was changed in the step that was just taken, to both sides
+    where it is `deep`; else the run's own polynomial is known.
+    """
+    twin, up = view(V.words[TWIN], Scene), in_workspace(V.words[UP])[1]
+    set_parameter(V, twin, scene, k, e)
+    code = call_int(V.words[FIT_DENSE], (V.words[UP], t, h, up.y, up.trial))
+    down = in_workspace(V.words[DOWN])[1]
+    if deep:
+        set_parameter(V, twin, scene, k, -e)
+        code = code or call_int(V.words[FIT_DENSE], (V.words[DOWN], t, h, down.y, down.trial))
+    for j in range(V.dense.shape[1]):
+        for i in range(V.dense.shape[2]):
+            there = down.dense[j, i] if deep else V.path[j, i]
+            V.dense[k, j, i] = (up.dense[j, i] - there) / (2.0 * e if deep else e)
+    return code

@@ -29,7 +29,7 @@ from mbsim.integrators.scheme import (
     Method,
     in_workspace,
 )
-from mbsim.sensitivity.along import is_too_much, project_end, remember_end
+from mbsim.sensitivity.along import is_too_much, project_end, remember_end, value_within
 from mbsim.sensitivity.arrays import (
     ALONG,
     ASKED,
@@ -38,8 +38,10 @@ from mbsim.sensitivity.arrays import (
     BENT,
     CHANGES,
     COMMIT,
+    DOWN_SIDE,
     F_BEFORE,
     FITTED,
+    FOLLOWED,
     JOINTS,
     LAST_ON,
     LAST_UNTIL,
@@ -52,6 +54,8 @@ from mbsim.sensitivity.arrays import (
     ODD,
     ORDERED,
     OUTPUT,
+    OWN,
+    PLAIN,
     REMEMBERED,
     RHS,
     ROWS,
@@ -73,16 +77,18 @@ from mbsim.sensitivity.events import (
     note_kept,
     note_shifts,
 )
-from mbsim.sensitivity.explicit import explicit_step, fit_beside
+from mbsim.sensitivity.explicit import explicit_step, fit_beside, fit_path
 from mbsim.sensitivity.implicit import implicit_step
 from mbsim.sensitivity.later import UNKNOWN, add, add_motion, give_up, go_on, is_steady, pays
-from mbsim.sensitivity.twin import half_step, keep_unit, reach_of, set_parameter
+from mbsim.sensitivity.twin import half_step, is_deep, keep_unit, one_side, reach_of, set_parameter
 
 #: Where the packed `Variations` stand: where those of MOREAU would, which takes no part in this.
 AT = Hook.STEPPING
 #: A parameter that moves bodies by their usual sizes when it changes by 1e-9 of itself moves them
 #: by chance.
 LARGEST = 1e9
+#: Where so many steps in a row bend the method's own is not tried any more but now and then.
+OFTEN, NOW_AND_THEN = 3, 8
 #: What derivatives may take is counted from so many evaluations of the run on.
 AT_FIRST = 200
 
@@ -102,13 +108,13 @@ def lose(V: Variations, k: int, t: float, why: int) -> None:
 
 
 @jitable
-def fit(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int, e: float) -> int:
-    """Fill the polynomials of the run's step, and of derivative k of an explicit one.
-
-    `e` is by how much the parameter was changed in the step.
-    """
+def follow(V: Variations, scene: Scene, m: Method, t: float, h: float) -> int:
+    """Fill the polynomial of the run's step, once for all parameters; return a code."""
+    if V.words[FOLLOWED] == 1:
+        return 0
+    V.words[FOLLOWED] = 1
     if V.words[ATTEMPT] != 0:
-        return fit_beside(V, scene, m, t, h, k, e)
+        return fit_path(V, scene, m, t, h)
     if V.words[ALONG] == 1:
         fit_hermite(V, m, h)
         return 0
@@ -138,6 +144,9 @@ def own_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int)
         V.error[k] = math.inf
         return 0
     if V.words[ATTEMPT] != 0:
+        if V.words[CHANGES] > 0 or (V.bent[k] >= OFTEN and V.bent[k] % NOW_AND_THEN != 0):
+            V.error[k] = math.inf
+            return 0
         return explicit_step(V, scene, m, t, h, k)
     code = implicit_step(V, scene, m, t, h, k)
     if code == Code.NOT_CONVERGED:
@@ -162,13 +171,14 @@ def bent_step(
     for i in range(len(m.y)):
         V.next[k, i] = V.own[i]
     e = half_step(V, k)
-    goes_on, later = V.words[ALONG] == 1, V.later[k, LAST_UNTIL]
+    goes_on, later, V.parts[k] = V.words[ALONG] == 1, V.later[k, LAST_UNTIL], 0
     code, V.later[k, LAST_ON] = step_along(V, scene, t, h, k, (0.0, 1.0), goes_on, later)
     if code == 0 and V.words[JOINTS] == 1:
         code = project_end(V, scene, m, t + h, k, e)
-    if code == 0 and V.words[REMEMBERED] > 0:
+    unknown = V.words[ALONG] == 0 and (changes or not V.error[k] < math.inf)
+    if code == 0 and (V.words[REMEMBERED] > 0 or unknown):
         code = remember_end(V, scene, m, t, h, k, e)
-        V.reach[k] = 0.0 if changes else reach_of(V, e)
+        V.reach[k] = reach_of(V, 2.0 * e, DOWN_SIDE)
     return code
 
 
@@ -187,17 +197,29 @@ def carry(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) ->
     for i in range(len(d)):
         V.own[i] = d[i]
     add(d, m.k[0], later)
-    e, code = half_step(V, k), own_step(V, scene, m, t, h, k)
+    deep = V.words[ATTEMPT] != 0 and is_deep(V, k)
+    e = half_step(V, k) if deep else one_side(V, m, k)
+    code = own_step(V, scene, m, t, h, k)
     add(V.next[k], V.jump[F_BEFORE], -later)
     if code == 0:
         changes = V.words[CHANGES] > 0 or is_bent(V, scene)
         bends = changes or V.error[k] > V.enough[0]
-        V.reach[k] = 0.0 if changes or V.words[ALONG] == 1 else reach_of(V, e)
+        if changes:
+            V.reach[k] = 0.0
+        elif V.error[k] < math.inf:
+            V.reach[k] = reach_of(V, e, OWN)
         V.bends[k] = 1 if bends else 0
+        V.bent[k] = V.bent[k] + 1 if bends and not changes else 0
         V.words[BENT] += V.bends[k]
-        if bends or later != 0.0 or (m.memory[SHOWN] == 1.0 and V.words[ATTEMPT] != 0):
-            # with the step of the differences that were taken: `reach` is the next one's
-            code = fit(V, scene, m, t, h, k, e)
+        shown = m.memory[SHOWN] == 1.0 and V.words[ATTEMPT] != 0
+        # with the step of the differences that were taken: `reach` is the next one's
+        if shown and not bends and deep:
+            # before `follow`, which takes the place of one side
+            code = fit_beside(V, scene, t, h, k, e, deep)
+        if code == 0 and (bends or later != 0.0 or shown):
+            code = follow(V, scene, m, t, h)
+        if code == 0 and shown and not bends and not deep:
+            code = fit_beside(V, scene, t, h, k, e, deep)
         if code == 0 and bends:
             code = bent_step(V, scene, m, t, h, k, changes)
     for i in range(len(d)):
@@ -209,7 +231,7 @@ def carry(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) ->
 def take_step(V: Variations, scene: Scene, m: Method, t: float, h: float) -> None:
     """Carry all derivatives over the step from t that is taken."""
     twin = view(V.words[TWIN], Scene)
-    V.words[CHANGES] = V.words[ORDERED] = 0
+    V.words[CHANGES] = V.words[ORDERED] = V.words[PLAIN] = V.words[FOLLOWED] = 0
     V.words[STEADY] = UNKNOWN
     touches = scene.work.hit[len(scene.work.hit) - 1] > 0
     V.words[MOST] = V.words[WORTH] * len(V.size) * (m.counts[EVALUATIONS] + AT_FIRST)
@@ -305,6 +327,31 @@ def note_changes(V: Variations, scene: Scene, t: float) -> None:
 
 
 @jitable
+def bent_at(V: Variations, scene: Scene, m: Method, k: int, s: float, out: F1) -> int:
+    """Write derivative k at a part of the last step, in which forces bend; return a code."""
+    h, begin, done = m.memory[LAST_STEP], m.memory[LAST_TIME], V.shown[k]
+    later = value_within(V, k, s)
+    if math.isfinite(later):
+        code = add_motion(V, scene, begin, h, s, k, -later)
+        for i in range(len(out)):
+            out[i] = V.next[k, i]
+        return code
+    twin, code = view(V.words[TWIN], Scene), 0
+    twin.world.past[0] = WITHIN
+    for i in range(len(out)):
+        V.next[k, i] = V.kept[k, i]
+    if s > done[SHOWN_AT]:
+        # from the row before it in this step on, or a long step is gone over again for each
+        span, later = (done[SHOWN_AT], s), done[SHOWN_LATER]
+        code, done[SHOWN_LATER] = step_along(V, scene, begin, h, k, span, False, later)
+        done[SHOWN_AT] = s
+    twin.world.past[0] = NOW
+    for i in range(len(out)):
+        out[i] = V.kept[k, i] = V.next[k, i]
+    return code
+
+
+@jitable
 def derivative_at(V: Variations, scene: Scene, m: Method, k: int, t: float, out: F1) -> int:
     """Write derivative k at a time within the last step, or at its end; return a code."""
     h, n = m.memory[LAST_STEP], len(out)
@@ -314,21 +361,7 @@ def derivative_at(V: Variations, scene: Scene, m: Method, k: int, t: float, out:
         return 0
     s, code = min(1.0, (t - m.memory[LAST_TIME]) / h), 0
     if V.bends[k] == 1:
-        twin = view(V.words[TWIN], Scene)
-        twin.world.past[0] = WITHIN
-        code, done = 0, V.shown[k]
-        for i in range(n):
-            V.next[k, i] = V.kept[k, i]
-        if s > done[SHOWN_AT]:
-            # from the row before it in this step on, or a long step is gone over again for each
-            span, later = (done[SHOWN_AT], s), done[SHOWN_LATER]
-            begin = m.memory[LAST_TIME]
-            code, done[SHOWN_LATER] = step_along(V, scene, begin, h, k, span, False, later)
-            done[SHOWN_AT] = s
-        twin.world.past[0] = NOW
-        for i in range(n):
-            out[i] = V.kept[k, i] = V.next[k, i]
-        return code
+        return bent_at(V, scene, m, k, s, out)
     d, r = V.dense[k], 1.0 - s
     last = len(d) - 1
     for i in range(n):

@@ -21,25 +21,38 @@ from mbsim.integrators.radau5 import G0, G_IM, G_RE, TI, C, T
 from mbsim.integrators.radau5 import E as ERROR
 from mbsim.integrators.radau5 import Z as STAGES_AT
 from mbsim.integrators.scheme import FRESH, LAST_STEP, Method, in_workspace
-from mbsim.sensitivity.arrays import JOINTS, LAST_UNTIL, LEFT, REMEMBERED, TWIN, UP, Variations
+from mbsim.sensitivity.arrays import (
+    JOINTS,
+    LEFT,
+    OWN,
+    PLAIN,
+    REMEMBERED,
+    TWIN,
+    UP,
+    UP_SIDE,
+    Variations,
+)
 from mbsim.sensitivity.twin import (
     half_step,
     keep_change,
     keep_depths,
+    keep_memory,
     keep_side,
     keep_unit,
+    one_side,
     set_parameter,
 )
 
 #: Rows of `Variations.stage`: stages less D, F, the right-hand sides and solutions of both systems,
-#: a point and f there.
+#: a point and f there, stages before a correction.
 Z, F, REAL, REAL_D, PAIR, PAIR_D, POINT, SLOPE = 0, 3, 6, 7, 8, 10, 12, 13
-STAGES = 14
+KEPT = 14
+STAGES = 17
 #: By how much the error of order 3 overrates that of the step.
 OVERRATED = 100.0
 #: What an iteration may leave is less by this while bodies collide: forces turn what is left of
 #: places into speeds.
-IN_IMPACT = 0.1
+IN_IMPACT = 0.02
 #: The iteration fails after so many, and where a correction is more than SLOW of that before: the
 #: linearisation is that of other forces.
 MOST, SLOW = 12, 0.5
@@ -78,35 +91,48 @@ def point_beside(V: Variations, m: Method, k: int, j: int, e: float) -> None:
 
 
 @jitable
-def evaluate_stages(
-    V: Variations, scene: Scene, m: Method, t: float, h: float, k: int, e: float
-) -> int:
-    """Fill F at all stages; return a code."""
-    twin = view(V.words[TWIN], Scene)
+def evaluate_plain(V: Variations, scene: Scene, m: Method, t: float, h: float) -> int:
+    """Fill f of the run itself at all stages, once for all parameters; return a code."""
+    twin, x = view(V.words[TWIN], Scene), V.stage[POINT]
     p = in_workspace(V.words[UP])[0]
-    part = 0.5 / e
-    for side in range(2):
-        sign = 1.0 if side == 0 else -1.0
-        set_parameter(V, twin, scene, k, sign * e)
-        for j in range(3):
-            point_beside(V, m, k, j, sign * e)
-            f = V.stage[SLOPE]
-            code = call_int(p.rhs, (p.context, t + C[j] * h, C[j] * h, V.stage[POINT], f))
-            if code != 0:
-                return code
-            for i in range(len(m.y)):
-                V.stage[F + j, i] = part * f[i] if side == 0 else V.stage[F + j, i] - part * f[i]
-        keep_depths(V, twin, side)
-        if V.words[REMEMBERED] > 0:
-            keep_side(V, twin, scene, side)
+    set_parameter(V, twin, scene, 0, 0.0)
+    for j in range(3):
+        for i in range(len(m.y)):
+            x[i] = m.y[i] + m.k[STAGES_AT + j, i]
+        code = call_int(p.rhs, (p.context, t + C[j] * h, C[j] * h, x, V.plain[j]))
+        if code != 0:
+            return code
+    keep_depths(V, twin, OWN)
+    keep_memory(V, twin, OWN)
+    V.words[PLAIN] = 1
     return 0
 
 
 @jitable
-def correct(
-    V: Variations, p: Problem, m: Method, t: float, h: float, k: int
-) -> tuple[int, float, float]:
-    """Correct the stages once; return a code, the correction's size and that of the stages."""
+def evaluate_stages(
+    V: Variations, scene: Scene, m: Method, t: float, h: float, k: int, e: float
+) -> int:
+    """Fill F at all stages, as differences by e from the run itself; return a code."""
+    twin = view(V.words[TWIN], Scene)
+    p = in_workspace(V.words[UP])[0]
+    set_parameter(V, twin, scene, k, e)
+    for j in range(3):
+        point_beside(V, m, k, j, e)
+        f = V.stage[SLOPE]
+        code = call_int(p.rhs, (p.context, t + C[j] * h, C[j] * h, V.stage[POINT], f))
+        if code != 0:
+            return code
+        for i in range(len(m.y)):
+            V.stage[F + j, i] = (f[i] - V.plain[j, i]) / e
+    keep_depths(V, twin, UP_SIDE)
+    if V.words[REMEMBERED] > 0:
+        keep_side(V, twin, scene, UP_SIDE)
+    return 0
+
+
+@jitable
+def correct(V: Variations, p: Problem, m: Method, t: float, h: float, k: int) -> int:
+    """Correct the stages once, and keep what they were; return a code."""
     n, z, f = len(m.y), V.stage[Z : Z + 3], V.stage[F : F + 3]
     g, re, im = G0 / h, G_RE / h, G_IM / h
     real, pair = V.stage[REAL], V.stage[PAIR : PAIR + 2]
@@ -125,22 +151,29 @@ def correct(
     code = call_int(p.solve, (p.context, t, h, real, d))
     if code == 0:
         code = call_int(p.solve_pair, (p.context, t, h, pair, dd))
-    size, whole = 0.0, 1.0 / V.size[k]
     for j in range(3):
         for i in range(n):
-            step = T[j, 0] * d[i] + T[j, 1] * dd[0, i] + T[j, 2] * dd[1, i]
-            z[j, i] += step
-            size = max(size, abs(step) / V.scale[i])
-            whole = max(whole, abs(V.d[k, i] + z[j, i]) / V.scale[i])
-    return code, size, whole
+            V.stage[KEPT + j, i] = z[j, i]
+            z[j, i] += T[j, 0] * d[i] + T[j, 1] * dd[0, i] + T[j, 2] * dd[1, i]
+    return code
 
 
 @jitable
-def project_stages(
-    V: Variations, scene: Scene, m: Method, t: float, h: float, k: int, e: float
-) -> int:
+def moved(V: Variations, k: int) -> tuple[float, float]:
+    """Return by how much a correction has moved the stages, and the size of what they lead to."""
+    size, whole = 0.0, 1.0 / V.size[k]
+    for j in range(3):
+        for i in range(len(V.scale)):
+            z = V.stage[Z + j, i]
+            size = max(size, abs(z - V.stage[KEPT + j, i]) / V.scale[i])
+            whole = max(whole, abs(V.d[k, i] + z) / V.scale[i])
+    return size, whole
+
+
+@jitable
+def project_stages(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
     """Put the derivatives of all stages along what holds; return a code."""
-    twin, n = view(V.words[TWIN], Scene), len(m.y)
+    twin, n, e = view(V.words[TWIN], Scene), len(m.y), half_step(V, k)
     p = in_workspace(V.words[UP])[0]
     part, x = 0.5 / e, V.stage[POINT]
     for side in range(2):
@@ -151,9 +184,9 @@ def project_stages(
             code = call_int(p.project, (p.context, t + C[j] * h, C[j] * h, x, x))
             if code != 0:
                 return code
-            moved = V.stage[F + j]
+            way = V.stage[F + j]
             for i in range(n):
-                moved[i] = part * x[i] if side == 0 else moved[i] - part * x[i]
+                way[i] = part * x[i] if side == 0 else way[i] - part * x[i]
     for j in range(3):
         for i in range(n):
             V.stage[Z + j, i] = V.stage[F + j, i] - V.d[k, i]
@@ -176,32 +209,39 @@ def stay_unit(V: Variations, m: Method, k: int, bodies: int) -> None:
 def implicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
     """Fill derivative k at the end of the step that is taken; return a code."""
     own = in_workspace(V.words[UP])[0]
-    e = half_step(V, k)
+    e = one_side(V, m, k)
+    code = 0 if V.words[PLAIN] == 1 else evaluate_plain(V, scene, m, t, h)
+    if code != 0:
+        return code
     extrapolate(V, m, h, k)
     before, largest = math.inf, 1.0
     for i in range(len(m.y)):
         largest = max(largest, abs(m.y[i]) / V.scale[i])
-    rate = V.rate[k] ** FORGET
-    left = V.enough[LEFT] * (IN_IMPACT if V.later[k, LAST_UNTIL] != 0.0 else 1.0)
+    rate, rounding = V.rate[k] ** FORGET, ROUNDING / abs(e) * largest
+    touches = V.words[REMEMBERED] == 0 and scene.work.hit[len(scene.work.hit) - 1] > 0
+    left = V.enough[LEFT] * (IN_IMPACT if touches else 1.0)
     for iteration in range(MOST):
         code = evaluate_stages(V, scene, m, t, h, k, e)
         if code != 0:
             return code
-        code, size, whole = correct(V, own, m, t, h, k)
+        code = correct(V, own, m, t, h, k)
         if code == 0 and V.words[JOINTS] == 1:
-            code = project_stages(V, scene, m, t, h, k, e)
+            code = project_stages(V, scene, m, t, h, k)
         else:
             stay_unit(V, m, k, len(scene.bodies.mass))
         if code != 0:
             return code
+        size, whole = moved(V, k)
         if not size < math.inf:
             return Code.NOT_CONVERGED
         if iteration > 0:
-            rate = min(size / before, 0.99) if before > 0.0 else 0.0
+            now = min(size / before, 0.99) if before > 0.0 else 0.0
+            # of what is rounded no rate is known but that it is no larger
+            rate = now if size > rounding else min(now, rate)
         if rate / (1.0 - rate) * size <= left * whole:
             break
         slow = size > SLOW * before
-        if slow and size <= ROUNDING / e * largest:
+        if slow and size <= rounding:
             break
         if slow or iteration + 1 == MOST:
             return Code.NOT_CONVERGED
@@ -213,7 +253,7 @@ def implicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k:
     if code != 0:
         return code
     if V.words[REMEMBERED] > 0:
-        keep_change(V, k, e)
+        keep_change(V, k, e, OWN)
     return 0
 
 
@@ -236,16 +276,14 @@ def estimate_error(
         for i in range(len(m.y)):
             r[i] += (V.dense[k, 1, i] - V.dense[k, 2, i] - V.dense[k, 3, i]) / m.memory[LAST_STEP]
     else:
-        for side in range(2):
-            sign = 1.0 if side == 0 else -1.0
-            set_parameter(V, twin, scene, k, sign * e)
-            for i in range(len(m.y)):
-                x[i] = m.y[i] + sign * e * V.d[k, i]
-            code = call_int(p.rhs, (p.context, t, 0.0, x, f))
-            if code != 0:
-                return code
-            for i in range(len(m.y)):
-                r[i] += sign * 0.5 / e * f[i]
+        set_parameter(V, twin, scene, k, e)
+        for i in range(len(m.y)):
+            x[i] = m.y[i] + e * V.d[k, i]
+        code = call_int(p.rhs, (p.context, t, 0.0, x, f))
+        if code != 0:
+            return code
+        for i in range(len(m.y)):
+            r[i] += (f[i] - m.k[0, i]) / e
     if V.words[JOINTS] == 1:
         put_along(p, m, t, m.y, r, x)
     code = call_int(p.solve, (p.context, t, h, r, V.stage[REAL_D]))

@@ -38,7 +38,9 @@ _OWN_STATE = ("log/", "audit/", "rows/", "state/memory", "state/before", "state/
 ENOUGH, ENOUGH_TOL = 1e-9, 10.0
 #: What an iteration may leave, over the error of a step; of a derivative, where friction remembers:
 #: when it sticks and slips follows from depths, which are far smaller than the model.
-LEFT, LEFT_OF_MEMORY = 0.01, 1e-13
+LEFT, LEFT_OF_MEMORY = 0.05, 1e-13
+#: What parts of usual steps of differences, and of the least ones, those to one side take.
+ONE_SIDED, ONE_SIDED_IN_IMPACTS = (3.0, 1.0, 1.0), (1.0, 0.1, 0.3)
 #: What is no signal of the motion.
 _NO_SIGNALS = ("time", "state/", "contact_points/", "events")
 _WHY = {
@@ -147,7 +149,8 @@ class Sensitivities:
             dense=np.zeros((count, 0, n)),
             later=np.zeros((count, 2)),
             next=np.zeros((count, n)),
-            far=np.zeros((2, *shape)),
+            far=np.zeros((3, *shape)),
+            plain=np.zeros((3, n)),
             stage=np.zeros((STAGES, n)),
             path=np.zeros((0, n)),
             work=np.zeros((WORK, n)),
@@ -155,12 +158,13 @@ class Sensitivities:
             enough=np.array((enough, LEFT_OF_MEMORY if shape[1] else LEFT * enough)),
             rate=np.full(count, 0.99),
             bends=np.zeros(count, dtype=np.int64),
+            bent=np.zeros(count, dtype=np.int64),
             jump=np.zeros((3, n)),
             end=np.zeros((count, *shape)),
             middle=np.zeros((count, *shape)),
             mode=np.zeros(shape[0]),
             reach=np.zeros(count),
-            depth=np.zeros((2, shape[0])),
+            depth=np.zeros((3, shape[0])),
             odd=np.zeros((2, shape[0]), dtype=np.int64),
             line=np.zeros(2),
             shift=np.zeros((count, shape[0] + 1)),
@@ -170,9 +174,16 @@ class Sensitivities:
             seen=np.zeros(len(scene.state.touching) + 1, dtype=np.int64),
             own=np.zeros(n),
             kept=np.zeros((count, n)),
+            part=np.zeros((count * at.MOST_PARTS, 5, n)),
+            about=np.zeros((count * at.MOST_PARTS, 6)),
+            parts=np.zeros(count, dtype=np.int64),
+            lasted=np.zeros(count),
             shown=np.zeros((count, 2)),
             change=np.zeros((at.MOST_CHANGES, 2)),
             row=np.zeros((4, n)),
+            one_sided=np.array(
+                ONE_SIDED_IN_IMPACTS if self.system.contact_ids and not shape[1] else ONE_SIDED
+            ),
             scale=_scale(self.system, n),
             room=_scale(self.system, n) * _steps(self.system, n),
             weights=np.zeros(0),

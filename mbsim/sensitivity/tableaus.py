@@ -33,6 +33,12 @@ from mbsim.integrators.dopri5 import (
     C3,
     C4,
     C5,
+    D1,
+    D3,
+    D4,
+    D5,
+    D6,
+    D7,
     E1,
     E3,
     E4,
@@ -43,6 +49,8 @@ from mbsim.integrators.dopri5 import (
 
 #: Rows of what follows: of order 5; of order 3, which does for steps of generalised-alpha.
 OF_FIFTH, OF_THIRD = range(2)
+#: Weights of the fifth coefficient of the polynomial of a part; a cubic has none.
+DENSE = np.zeros((2, 7))
 #: Times of stages, weights of the slopes before, weights of the error.
 C, A, E = np.zeros((2, 7)), np.zeros((2, 7, 6)), np.zeros((2, 7))
 #: The stage at the end, and the order.
@@ -54,6 +62,7 @@ A[OF_FIFTH, 3, :3] = A41, A42, A43
 A[OF_FIFTH, 4, :4] = A51, A52, A53, A54
 A[OF_FIFTH, 5, :5] = A61, A62, A63, A64, A65
 A[OF_FIFTH, 6] = B1, 0.0, B3, B4, B5, B6
+DENSE[OF_FIFTH] = D1, 0.0, D3, D4, D5, D6, D7
 E[OF_FIFTH] = E1, 0.0, E3, E4, E5, E6, E7
 C[OF_THIRD, :4] = 0.0, 1 / 2, 3 / 4, 1.0
 A[OF_THIRD, 1, :1] = 1 / 2

@@ -14,8 +14,9 @@ from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.core.memory import floats_at
 from mbsim.dynamics.contact.forces import BRANCH, DEPTH
+from mbsim.integrators.scheme import STEPS, Method
 from mbsim.laws.catalog import UNDECIDED
-from mbsim.sensitivity.arrays import ODD, REMEMBERED, SET, Variations
+from mbsim.sensitivity.arrays import ODD, REMEMBERED, SET, UP_SIDE, Variations
 
 #: Half of the step of differences, in usual sizes of the parameter and of y.
 STEP = 1e-6
@@ -27,11 +28,37 @@ STEP_OF_CONTACTS, PART_OF_DEPTH = 1e-9, 1e-6
 @jitable
 def half_step(V: Variations, k: int) -> float:
     """Return by how much parameter k is changed to either side."""
+    return part_of_step(V, k, 1.0, 1.0, 1.0)
+
+
+@jitable
+def part_of_step(V: Variations, k: int, part: float, least: float, deep: float) -> float:
+    """Return by how much parameter k is changed, with such parts of the usual steps."""
     largest = surely = 1.0 / (STEP * V.size[k])
     for i in range(len(V.room)):
         largest = max(largest, abs(V.d[k, i]) / (STEP * V.scale[i]))
         surely = max(surely, abs(V.d[k, i]) / V.room[i])
-    return max(1.0 / surely, min(1.0 / largest, V.reach[k]))
+    return max(least / surely, min(part / largest, deep * V.reach[k]))
+
+
+@jitable
+def one_side(V: Variations, m: Method, k: int) -> float:
+    """Return by how much parameter k is changed for differences from the run itself.
+
+    To one side, and to the other in the next step: what one side is off by, e f_yy D D / 2, cancels
+    from step to step but for what it changes in one.
+    """
+    e = part_of_step(V, k, V.one_sided[0], V.one_sided[1], V.one_sided[2])
+    return e if m.counts[STEPS] % 2 == 0 else -e
+
+
+@jitable
+def is_deep(V: Variations, k: int) -> bool:
+    """Return whether depths of contacts bound the step of a difference, as in an impact.
+
+    There forces bend far more than elsewhere, and differences to one side are not good enough.
+    """
+    return V.words[REMEMBERED] == 0 and half_step(V, k) >= V.reach[k] > 0.0
 
 
 @jitable
@@ -42,13 +69,13 @@ def keep_depths(V: Variations, twin: Scene, side: int) -> None:
 
 
 @jitable
-def reach_of(V: Variations, e: float) -> float:
-    """Return by how much a parameter may be changed, by the depths of both sides of e."""
+def reach_of(V: Variations, width: float, other: int) -> float:
+    """Return by how much a parameter may be changed, by depths of a side `width` from another."""
     reach = math.inf
     for s in range(V.depth.shape[1]):
-        up, down = V.depth[0, s], V.depth[1, s]
+        up, down = V.depth[UP_SIDE, s], V.depth[other, s]
         if up != down:
-            reach = min(reach, 2.0 * e * PART_OF_DEPTH * min(up, down) / abs(up - down))
+            reach = min(reach, abs(width) * PART_OF_DEPTH * min(up, down) / abs(up - down))
     return reach
 
 
@@ -96,12 +123,19 @@ def is_asked(V: Variations, s: int) -> bool:
 
 
 @jitable
+def keep_memory(V: Variations, scene: Scene, side: int) -> None:
+    """Keep what laws make of their memories, of the twin's side or of the run itself."""
+    for s in range(V.far.shape[1]):
+        for j in range(V.far.shape[2]):
+            V.far[side, s, j] = scene.work.memory[s, j] if scene.work.touching[s] == 1 else 0.0
+
+
+@jitable
 def keep_side(V: Variations, twin: Scene, scene: Scene, side: int) -> None:
     """Keep what laws make of their memories on one side, and whether one is on another branch."""
+    keep_memory(V, twin, side)
     for s in range(V.far.shape[1]):
         touches = twin.work.touching[s] == 1
-        for j in range(V.far.shape[2]):
-            V.far[side, s, j] = twin.work.memory[s, j] if touches else 0.0
         asked, goes_on = twin.work.slot[s, BRANCH], scene.state.touching[s] == 1 and touches
         odd = goes_on and asked != UNDECIDED and asked != scene.state.mode[s] and not is_asked(V, s)
         V.odd[side, s] = 1 if odd else 0
@@ -110,11 +144,11 @@ def keep_side(V: Variations, twin: Scene, scene: Scene, side: int) -> None:
 
 
 @jitable
-def keep_change(V: Variations, k: int, e: float) -> None:
-    """Keep how what laws remember at the end of the step moves with parameter k."""
+def keep_change(V: Variations, k: int, width: float, other: int) -> None:
+    """Keep how what laws remember at the end of the step moves, of a side and one `width` off."""
     for s in range(V.far.shape[1]):
         for j in range(V.far.shape[2]):
-            V.end[k, s, j] = 0.5 / e * (V.far[0, s, j] - V.far[1, s, j])
+            V.end[k, s, j] = (V.far[UP_SIDE, s, j] - V.far[other, s, j]) / width
 
 
 @jitable

@@ -1,0 +1,55 @@
+"""What sensitivities take beside a run: evaluations over the run's own."""
+
+from __future__ import annotations
+
+import pytest
+
+import mbsim
+from helpers.folders import MODELS
+
+INERTIAS = [f"Body_Rigid[2].inertia_{axis}" for axis in ("xx", "yy", "zz")]
+CONTACT = "Force_Contact[301]"
+
+
+def cost(deck, integrator, names, **how):
+    """Return evaluations beside a run over the run's own, and the run's own."""
+    run = mbsim.simulate(
+        MODELS / f"{deck}.xml", integrator=integrator, tol=1e-8, sensitivity=names, **how
+    )
+    own = run.stats["rhs_evaluations"]
+    return run.parameters[names[0]]["evaluations"] / own, own
+
+
+@pytest.mark.parametrize(
+    ("deck", "integrator", "names", "most"),
+    [
+        ("free_top", "DOPRI5", INERTIAS[:1], 1.1),
+        ("free_top", "DOP853", INERTIAS[:1], 1.4),
+        ("free_top", "RADAU5", INERTIAS[:1], 1.0),
+        ("bowling_ball", "DOPRI5", ["Body_Rigid[2].v_ic_x"], 1.3),
+        ("bowling_ball", "RADAU5", ["Body_Rigid[2].v_ic_x"], 1.0),
+        ("sdnd100", "DOPRI5", [f"{CONTACT}.mu_dynamic"], 2.0),
+        ("sdnd100", "DOP853", [f"{CONTACT}.mu_dynamic"], 2.0),
+        ("sdnd100", "RADAU5", [f"{CONTACT}.mu_dynamic"], 1.5),
+    ],
+)
+def test_a_parameter_takes_no_more_than_the_manual_says(deck, integrator, names, most):
+    assert cost(deck, integrator, names)[0] < most
+
+
+def test_parameters_share_the_evaluations_of_the_run_itself():
+    first, own = cost("free_top", "RADAU5", INERTIAS[:1])
+    three, _ = cost("free_top", "RADAU5", INERTIAS)
+    # three stages a step are the run's own
+    assert (three - first) / 2.0 < 0.7 * first
+    assert own > 0
+
+
+@pytest.mark.parametrize("integrator", ["DOPRI5", "DOP853", "RADAU5", "GALPHA"])
+def test_rows_within_impacts_take_next_to_nothing(integrator):
+    # steps that are cut into parts keep these parts' polynomials
+    names, end = ["Reference_Marker[20].pos_z"], 0.4
+    few, own = cost("bouncing_sphere", integrator, names, end_time=end, print_interval=0.1)
+    many, others = cost("bouncing_sphere", integrator, names, end_time=end, print_interval=2e-4)
+    # a row may take one more for s f, and polynomials of DOP853 take some for each step
+    assert abs(many * others - few * own) < 0.5 * few * own + 200
