@@ -13,7 +13,7 @@ from numba.core.ccallback import CFunc
 from numba.extending import overload, register_jitable
 
 import mbsim.core.address_forms  # noqa: F401  (what they are for compiled code)
-from mbsim.core import jit, linking, profile
+from mbsim.core import linking, profile
 from mbsim.core.function_cache import CodeCache
 from mbsim.core.jitable import take_marked
 from mbsim.core.machine_code import Code
@@ -38,7 +38,8 @@ def register() -> None:
 class _Watch(event.Listener):
     """Counts the time that Numba compiles (loading from the cache is not compiling)."""
 
-    def __init__(self) -> None:
+    def __init__(self, begins: Callable[[], None], took: Callable[[float], None]) -> None:
+        self._begins, self._took = begins, took
         self._depth = 0
         self._began = 0.0
         self._collects = False
@@ -52,7 +53,7 @@ class _Watch(event.Listener):
                 self._counts.enter("compile")
             self._collects = gc.isenabled()
             gc.disable()  # the compiler's million small objects are looked through again and again
-            jit.tell_of_first()
+            self._begins()
         self._depth += 1
 
     def on_end(self, happened: Any) -> None:
@@ -60,14 +61,17 @@ class _Watch(event.Listener):
         if self._depth == 0:
             if self._collects:
                 gc.enable()
-            jit.compile_seconds += time.perf_counter() - self._began
+            self._took(time.perf_counter() - self._began)
             if self._counts is not None:
                 self._counts.leave()
 
 
-_watch = _Watch()
-event.register("numba:run_pass", _watch)
-event.register("numba:compile", _watch)  # around the passes, and what Python calls is linked there
+def watch(begins: Callable[[], None], took: Callable[[float], None]) -> None:
+    """Have one function called before Numba compiles, and one with the seconds behind that."""
+    listener = _Watch(begins, took)
+    event.register("numba:run_pass", listener)
+    # around the passes, and what Python calls is linked there
+    event.register("numba:compile", listener)
 
 
 def dispatcher(

@@ -15,6 +15,7 @@ from __future__ import annotations
 import functools
 import time
 from collections.abc import Callable
+from types import ModuleType
 from typing import Any, TypeVar, cast
 
 from mbsim.core import machine_code, profile
@@ -44,6 +45,21 @@ def tell_of_first() -> None:
     if on_first_compile is not None:
         tell, on_first_compile = on_first_compile, None
         tell()
+
+
+def _add_seconds(seconds: float) -> None:
+    """Count time that was spent compiling."""
+    global compile_seconds
+    compile_seconds += seconds
+
+
+@functools.cache
+def _compiler() -> ModuleType:
+    """Return `core.compiling`, which counts here what it takes."""
+    from mbsim.core import compiling
+
+    compiling.watch(tell_of_first, _add_seconds)
+    return compiling
 
 
 class _NotKeptError(Exception):
@@ -94,7 +110,7 @@ def function(py_func: Callable[..., Any], allocates: bool = True) -> Callable[..
     is not cached: Numba would keep it while the arrays that it looks at change. What `allocates` no
     arrays need not count who uses which: that costs a call for each that is passed on.
     """
-    from mbsim.core import compiling
+    compiling = _compiler()
 
     def on_miss(name: str) -> None:
         _about_to_compile(name)
@@ -145,8 +161,7 @@ def address(py_func: Callable[..., Any], signature: Any, allocates: bool = False
             _about_to_compile(py_func.__qualname__)
         except _NotKeptError:
             return NOT_YET
-    from mbsim.core import compiling
-
+    compiling = _compiler()
     before, began = compile_seconds, time.perf_counter()
     with profile.part("compile"):
         made = compiling.c_function(py_func, signature, allocates)
