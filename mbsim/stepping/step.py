@@ -399,9 +399,12 @@ def solve_until_settled(
     What Newton's method leaves of a velocity, times the damper across it, is a force that the
     energy does not have.
     """
-    code = 0
+    M, code = S.motion, 0
     for _ in range(MOST_ROUNDS):
-        S.motion.guess[:] = S.motion.v[: len(S.motion.guess)]
+        for k in range(bodies_awake(scene)):
+            b = body_awake(scene, k)
+            for c in range(6):
+                M.guess[b, c] = M.v[b, c]
         code = solve_by_middle(scene, S, t, h, y, committed)
         if code != 0 or S.rest.count[WOKEN] == 1:
             return code
