@@ -381,6 +381,8 @@ def factor_node(a: N2, swap: I1, seen: F1, size: int) -> bool:
     if not factor_small(a, swap, size):
         return False
     for k in range(size):
+        # rows were exchanged one after the other
+        seen[k], seen[swap[k]] = seen[swap[k]], seen[k]
         if not abs(a[k, k]) > _LEFT * seen[k]:
             return False
     return True

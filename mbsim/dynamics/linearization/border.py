@@ -222,7 +222,7 @@ def held_by(scene: Scene, L: Linear, M: Real | Pair, row: int, b: int, out: N1) 
     if level < 2:
         times_rate(L, M, b, E)
     for j in range(len(out)):
-        total = L.row[row, b, j] + 0.0 * E[0, 0]
+        total = L.row[row, b, j] + 0.0 * M.c[0, C1]
         if level < 2:
             for i in range(len(out)):
                 total += L.row_rate[row, b, i] * E[i, j]
