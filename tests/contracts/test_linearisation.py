@@ -20,6 +20,7 @@ from helpers.free_bodies import Silent
 from helpers.mechanics import Body
 from helpers.mechanism_decks import SIDE, SKEW, Joint, Scene, marker, rotation
 from mbsim.arrays.hooks import Joints
+from mbsim.compile_model import tangent
 from mbsim.compile_model.build import build
 from mbsim.dynamics.pipeline.problem import implicit_hooks
 from mbsim.laws.catalog import SLIP, STICK
@@ -211,6 +212,13 @@ def of(scene, folder):
     return write_deck(folder, scene.xml())
 
 
+@pytest.fixture(params=["border", "nodes"])
+def multipliers(request, monkeypatch):
+    """Let multipliers be a dense border, or nodes of the elimination however few there are."""
+    fewest = 1 if request.param == "nodes" else 10**9
+    monkeypatch.setattr(tangent, "_MANY_EQUATIONS", fewest)
+
+
 def test_all_joints_are_here():
     from mbsim.joints.catalog import JOINTS as registered
 
@@ -223,6 +231,7 @@ def test_joint(kind, hold, tmp_path):
     check(of(two(kind, hold), tmp_path))
 
 
+@pytest.mark.usefixtures("multipliers")
 @pytest.mark.parametrize("kind", ["REVOLUTE", "UNIVERSAL", "CYLINDRICAL", "SPHERICAL", "PLANAR"])
 def test_a_loop(kind, tmp_path):
     scene = two(kind)
@@ -334,6 +343,7 @@ def saddle(id, par, npar, u, v, iord, iflag):
 """
 
 
+@pytest.mark.usefixtures("multipliers")
 @pytest.mark.parametrize("name", EQUATIONS)
 def test_equations(name, tmp_path):
     kind, text = EQUATIONS[name]
@@ -341,6 +351,7 @@ def test_equations(name, tmp_path):
     check(of(two(kind, extra=text), tmp_path), t=0.3)
 
 
+@pytest.mark.usefixtures("multipliers")
 @pytest.mark.parametrize("motions", ["R R", "R T", "T T"])
 def test_couplers(motions, tmp_path):
     scene = two("CYLINDRICAL")
@@ -681,6 +692,7 @@ def test_contacts_without_give(name, slip, tmp_path):
 # --- the systems themselves ---
 
 
+@pytest.mark.usefixtures("multipliers")
 @pytest.mark.parametrize("case", ["chain", "loop and states", "touching"])
 def test_complex_and_real_coefficients_agree(case, tmp_path):
     if case == "touching":
