@@ -157,6 +157,8 @@ class Joints(IntEnum):
     AUDIT = 10  # look at the residuals of equations
     READY = 11  # fill all that IMPULSE needs, at y
     IMPULSE = 12  # replace impulses on bodies by the changes of their velocities: see `impulses`
+    CLOSE = 13  # bring positions onto the equations by the least change in the norm of the masses
+    HOLD = 14  # the same of velocities, behind CLOSE
 
 
 class Dry(IntEnum):

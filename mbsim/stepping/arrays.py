@@ -141,7 +141,8 @@ class Motion(NamedTuple):
     taken: I1  # (pairs + 1,) the try of a step in which a pair has points by that; last: this one
     measured: I1  # (pairs,) 1 + list of near pairs in which its rows were measured, 0: none
     impulse: F1  # (ny,) impulses on bodies, then what they change of velocities
-    middle: F1  # (ny,) state in the midst of a step
+    middle: F1  # (ny,) state within a step at which forces are found
+    midst: F1  # (ny,) state in the midst of a step at which joints hold, see `forces`
     aside: F1  # (ny,) that, bodies moved along what an impact does to their ways
     half: F2  # (2, ny) states of a step's two halves, where it is compared with them
 
@@ -365,6 +366,7 @@ def make(
         measured=whole(pairs),
         impulse=numbers(ny),
         middle=numbers(ny),
+        midst=numbers(ny),
         aside=numbers(ny),
         half=numbers(2, ny),
     )

@@ -102,6 +102,7 @@ def list_awake(scene: Scene, S: Stepping, y: F1) -> None:
         if rest.body[row, ASLEEP] == 1:
             for c in range(BODY_SIZE * row, BODY_SIZE * (row + 1)):
                 S.motion.middle[c] = S.motion.half[0, c] = S.motion.half[1, c] = y[c]
+                S.motion.midst[c] = y[c]
     rest.count[LISTED_FIXED] = rest.count[GRID] = 0
     for k in range(scene.pairs.count[FIXED]):
         pair = scene.pairs.active[k]

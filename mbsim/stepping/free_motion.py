@@ -14,6 +14,7 @@ from mbsim.core.rotation import (
     norm,
     rotate,
     scale,
+    sub,
     unrotate,
     vector,
 )
@@ -33,26 +34,21 @@ def is_round(J: F2) -> bool:
 
 
 @jitable
-def spin_freely(scene: Scene, y: F1, b: int, h: float) -> V3:
-    """Return the angular velocity after h, global axes, that torques and the spin itself change.
+def spin_by_midpoint(J: F2, before: V3, T: V3, h: float) -> V3:
+    """Return the angular velocity after h that a torque T and the spin itself change, body axes.
 
-    The midpoint rule in body axes, I (w' - w) = h (T - m x I m), m = (w + w')/2: it keeps energy
-    and the size of the angular momentum of what spins freely, however long the step. The attitude
-    is then turned by m.
+    The midpoint rule, I (w' - w) = h (T - m x I m), m = (w + w')/2: it keeps energy and the size
+    of the angular momentum of what spins freely, however long the step.
     """
-    R, J, torque = scene.work.R[b], scene.bodies.inertia[b], scene.work.torque[b]
-    if is_round(J) and torque[0] == 0.0 and torque[1] == 0.0 and torque[2] == 0.0:
-        return vector(scene.work.w[b])
-    at = BODY_SIZE * b
-    before = (y[at + AT_W], y[at + AT_W + 1], y[at + AT_W + 2])
-    T = unrotate(R, vector(scene.work.torque[b]))
     w = before
+    if is_round(J) and T[0] == 0.0 and T[1] == 0.0 and T[2] == 0.0:
+        return w
     for _ in range(MOST_SPINS):
         m = scale(0.5, add(before, w))
         L = rotate(J, m)
         turns = cross(m, L)
-        change = rotate(J, (w[0] - before[0], w[1] - before[1], w[2] - before[2]))
-        off = add(change, scale(h, (turns[0] - T[0], turns[1] - T[1], turns[2] - T[2])))
+        change = rotate(J, sub(w, before))
+        off = add(change, scale(h, sub(turns, T)))
         k = 0.5 * h
         # I + h/2 ([m] I - [I m]) by rows, [a] b = a x b
         x = (
@@ -78,6 +74,21 @@ def spin_freely(scene: Scene, y: F1, b: int, h: float) -> V3:
         w = add(w, step)
         if norm(step) <= 1e-14 * norm(w):
             break
+    return w
+
+
+@jitable
+def spin_freely(scene: Scene, y: F1, b: int, h: float) -> V3:
+    """Return the angular velocity after h, global axes, of a body that no joint holds.
+
+    The attitude is turned by the mean of spins, see `spin_by_midpoint`.
+    """
+    R, J, torque = scene.work.R[b], scene.bodies.inertia[b], scene.work.torque[b]
+    if is_round(J) and torque[0] == 0.0 and torque[1] == 0.0 and torque[2] == 0.0:
+        return vector(scene.work.w[b])
+    at = BODY_SIZE * b
+    before = vector(y, at + AT_W)
+    w = spin_by_midpoint(J, before, unrotate(R, vector(torque)), h)
     m = scale(0.5, add(before, w))
     q = y[at : at + BODY_SIZE].copy()
     S = R.copy()

@@ -10,9 +10,8 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.codes import AUDIT_TOL, FOUND_ALLOWED, FOUND_VALUE, STEP_END
-from mbsim.arrays.hooks import Hook, Joints
+from mbsim.arrays.hooks import Hook
 from mbsim.arrays.scene import Scene
-from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import AT_Q, AT_V, BODY_SIZE
@@ -26,6 +25,7 @@ from mbsim.stepping.arrays import (
     Stepping,
 )
 from mbsim.stepping.displacements import comes_at
+from mbsim.stepping.forces import bring_onto_joints
 from mbsim.stepping.step import take_step
 
 #: What impacts may leave off without a word, over tol times the length: `results.audit`.
@@ -88,9 +88,8 @@ def take_part(
 ) -> int:
     """Take a step as `take_step` does, and bring it back onto joints; return 0 or a code."""
     code = take_step(scene, S, t, h, y, new, committed)
-    joints = scene.world.hooks[Hook.JOINTS]
-    if code == 0 and joints != 0:
-        code = call_int(joints, (scene, Joints.PROJECT, t + h, new, new))
+    if code == 0 and scene.world.hooks[Hook.JOINTS] != 0:
+        code = bring_onto_joints(scene, t + h, new)
     return code
 
 

@@ -21,6 +21,7 @@ from mbsim.stepping.arrays import ALL_STEPS, FIXED, HIT, Stepping
 from mbsim.stepping.audit import examine_step, mark_grounded
 from mbsim.stepping.awake import list_awake, settle
 from mbsim.stepping.displacements import place_within
+from mbsim.stepping.forces import bring_onto_joints
 from mbsim.stepping.friction import keep_yield, part_to_yield
 from mbsim.stepping.halves import take_fixed_step
 from mbsim.stepping.pairs import commit_distances
@@ -157,5 +158,14 @@ def commit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     return word if code == 0 else -code
 
 
+def project(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
+    """Bodies back onto their constraints, by the least change: steps are long."""
+    scene = view(context, Scene)
+    y = vector_at(a, scene.rows.y.shape[1])
+    if scene.world.hooks[Hook.JOINTS] != 0:
+        return failure_or(scene, bring_onto_joints(scene, t, y))
+    return 0
+
+
 #: By their names in `Problem`, in place of those of compliant contact.
-HOOKS = {"step": step, "norm": norm, "commit": commit}
+HOOKS = {"step": step, "norm": norm, "commit": commit, "project": project}

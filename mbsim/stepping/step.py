@@ -62,7 +62,7 @@ from mbsim.stepping.displacements import (
 )
 from mbsim.stepping.driven import add_work_of_motions, presses_on_driven
 from mbsim.stepping.energy import add_losses, keep_left, left_by_forces, left_by_spins
-from mbsim.stepping.forces import find_forces, find_motion
+from mbsim.stepping.forces import find_forces_within, find_motion
 from mbsim.stepping.free_motion import fill_motion, turn_to_global
 from mbsim.stepping.friction import (
     coefficient,
@@ -357,7 +357,7 @@ def solve_by_middle(scene: Scene, S: Stepping, t: float, h: float, y: F1, commit
             # the displacement is that of `shift` alone
             M.v[b, c] = M.before[b, c] + theta * change
     move_bodies(scene, S, y, theta * h, middle)
-    code = find_forces(scene, t + theta * h, middle, dy)
+    code = find_forces_within(scene, S, t, h, y)
     wake_loaded(scene, S)
     if code != 0 or S.rest.count[WOKEN] == 1:
         return code

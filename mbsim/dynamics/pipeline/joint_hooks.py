@@ -29,6 +29,12 @@ from mbsim.dynamics.constraints.equations import MISMATCH, fill_matrix, hold, po
 from mbsim.dynamics.constraints.folding import passes_fold
 from mbsim.dynamics.constraints.impulses import answer_impulses, answer_tree, make_ready
 from mbsim.dynamics.constraints.in_use import active_count
+from mbsim.dynamics.constraints.nearest import (
+    close_all,
+    close_tree,
+    hold_all_velocities,
+    hold_velocities,
+)
 from mbsim.dynamics.constraints.projection import (
     displace,
     prepare_equations,
@@ -98,12 +104,16 @@ def return_to_equations(scene: Scene, t: float, y: F1) -> None:
 
 
 @jitable
-def serve_impulses(scene: Scene, what: int, t: float, y: F1, dy: F1) -> int:
-    """Do what impulses are asked for; return 0."""
+def serve_steps(scene: Scene, what: int, t: float, y: F1, dy: F1) -> int:
+    """Do what steps with impulses ask for; return 0."""
     if what == Joints.READY:
         make_ready(scene, t, y)
-    else:
+    elif what == Joints.IMPULSE:
         answer_impulses(scene, dy)
+    elif what == Joints.CLOSE:
+        close_all(scene, t, y)
+    else:
+        hold_all_velocities(scene, t, y)
     return 0
 
 
@@ -112,8 +122,8 @@ def serve(scene: Scene, what: int, t: float, y: F1, dy: F1) -> int:
     """Do what joints are asked for (`Joints`); return 0 or a code."""
     if what == Joints.ACCELERATE:
         return constrain(scene, t, y, dy)
-    if what == Joints.READY or what == Joints.IMPULSE:
-        return serve_impulses(scene, what, t, y, dy)
+    if Joints.READY <= what <= Joints.HOLD:
+        return serve_steps(scene, what, t, y, dy)
     if what == Joints.PROJECT_TREE:
         quality = scene.sweep.quality
         drift, drifter = quality[DRIFT], quality[DRIFTER]
@@ -176,6 +186,10 @@ def serve_tree_joints(scene: Scene, what: int, t: float, y: F1, dy: F1) -> int:
         place_bodies(scene, y)
         project_tree(scene, y)
         project_tree_velocities(scene, y)
+    elif what == Joints.CLOSE:
+        close_tree(scene, y)
+    elif what == Joints.HOLD:
+        hold_velocities(scene, y)
     return 0
 
 

@@ -1,0 +1,102 @@
+"""MOREAU with joints in steps that are long for the motion: no energy is made, momentum stays."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mbsim
+from helpers.folders import MODELS
+from mbsim.bench import deck as text
+from mbsim.bench.scenes import s14_chain_box
+from mbsim.results.reading import Results
+
+LINKS, LENGTH, MASS, SPIN = 8, 0.2, 0.5, 10.0
+ACROSS = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
+ROUND, SLENDER = (0.0017, 0.0017, 0.0017), (1e-5, 0.0017, 0.0017)
+
+
+def thrown(joint: str, inertia: tuple[float, float, float], h: float, held: bool) -> str:
+    """Return a deck: links that spin at random, SPIN rad/s, on joints; no force acts on them."""
+    spins = np.random.default_rng(0).normal(size=(LINKS, 3)) * SPIN
+    if joint == "REVOLUTE":
+        spins[:, :2] = 0.0
+    end, velocity = np.zeros(3), np.zeros(3)
+    parts = [text.GROUND, text.marker(10, 1, (0.0, 0.0, 0.0))]
+    for k, w in enumerate(spins):
+        half = np.array([LENGTH / 2.0, 0.0, 0.0])
+        moves = velocity + np.cross(w, half)
+        parts += [
+            text.body(
+                2 + k, MASS, inertia, tuple(end + half), velocity=tuple(moves), spin=tuple(w)
+            ),
+            text.marker(1000 + k, 2 + k, tuple(end), *([ACROSS] if joint == "UNIVERSAL" else [])),
+            text.marker(2000 + k, 2 + k, tuple(end + 2.0 * half)),
+        ]
+        if k > 0 or held:
+            before = 2000 + k - 1 if k > 0 else 10
+            parts.append(text.joint(500 + k, joint, 1000 + k, before))
+        end, velocity = end + 2.0 * half, velocity + np.cross(w, 2.0 * half)
+    parts.append(f'<Param_Transient h_max="{h}" h_min="{h}"/>')
+    return text.deck("links that are thrown", parts, 100.0 * h)
+
+
+def momentum(results: Results) -> np.ndarray:
+    """Return the links' linear momentum at every row."""
+    return MASS * sum(results[f"bodies/{b}/velocity"] for b in results.ids("bodies"))
+
+
+@pytest.mark.parametrize("joint", ["SPHERICAL", "REVOLUTE", "UNIVERSAL"])
+@pytest.mark.parametrize("held", [False, True])
+@pytest.mark.parametrize("inertia", [ROUND, SLENDER])
+@pytest.mark.parametrize("h", [0.002, 0.02])
+def test_joints_make_no_energy(
+    joint: str, held: bool, inertia: tuple[float, float, float], h: float
+) -> None:
+    """h 0.02 s turns a link by up to 0.5 rad; what projections take is of order 3 over a run."""
+    results = mbsim.simulate(thrown(joint, inertia, h, held), integrator="MOREAU")
+    kinetic = results["energy/kinetic"]
+    assert kinetic.max() <= kinetic[0] * (1.0 + 1e-3)
+    assert kinetic.min() >= kinetic[0] * (1.0 - (1e-4 if h == 0.002 else 0.25))
+    if not held:
+        p = momentum(results)
+        assert np.abs(p - p[0]).max() < 1e-9 * MASS * LINKS * SPIN * LENGTH
+
+
+@pytest.mark.parametrize("inertia", [ROUND, SLENDER])
+@pytest.mark.parametrize("h", [0.1, 0.3])
+def test_a_step_that_is_far_too_long_ends_in_rest_and_not_in_nothing(
+    inertia: tuple[float, float, float], h: float
+) -> None:
+    """Links turn by up to a whole turn in a step: the run goes on, and says what it took."""
+    results = mbsim.simulate(thrown("REVOLUTE", inertia, h, True), integrator="MOREAU")
+    kinetic = results["energy/kinetic"]
+    assert kinetic.max() <= kinetic[0] * (1.0 + 1e-9)
+    assert any("energy" in warning for warning in results.audit.warnings)
+
+
+@pytest.mark.parametrize(("h", "away"), [(2e-3, 0.03), (5e-3, 0.06), (1e-2, 0.15)])
+def test_a_chain_that_is_whipped_down(h: float, away: float) -> None:
+    """50 links fall on a box and hang over it, against RADAU5 with stiff contact; rms [m]."""
+    scene = s14_chain_box.SCENES[0]
+    exact = mbsim.simulate(scene.deck({}), integrator="AUTO", tol=1e-4)
+    results = mbsim.simulate(scene.deck({"h": h}), integrator="MOREAU")
+    energy = results["energy/kinetic"] + results["energy/potential"]
+    assert energy.max() <= energy[0] + 1e-2 * results["energy/kinetic"].max()
+    apart = [
+        results[f"bodies/{b}/position"] - exact[f"bodies/{b}/position"]
+        for b in results.ids("bodies")
+    ]
+    assert np.sqrt(np.mean(np.sum(np.square(apart), axis=2))) < away
+
+
+@pytest.mark.parametrize("deck", ["flyball_governor", "stiff/stiff_governor"])
+def test_stiff_rods_turn_without_a_moment_of_their_own(deck: str) -> None:
+    """Forces of theta > 1/2 in steps whose joints hold at 1/2: angular momentum stays."""
+    model = mbsim.read_model(MODELS / f"{deck}.xml")
+    exact = mbsim.simulate(model, integrator="RADAU5", tol=1e-8, end_time=1.0)
+    results = mbsim.simulate(model, integrator="MOREAU", tol=1e-4, end_time=1.0)
+    spin = results["bodies/2/angular_velocity"] - exact["bodies/2/angular_velocity"]
+    assert np.abs(spin).max() < 2e-3 * np.abs(exact["bodies/2/angular_velocity"]).max()
+    total = sum(results[f"energy/{kind}"] for kind in ("kinetic", "potential", "dissipated"))
+    assert np.abs(total - total[0]).max() < 1e-3 * results.audit.of
