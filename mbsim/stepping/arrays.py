@@ -141,6 +141,8 @@ class Motion(NamedTuple):
     taken: I1  # (pairs + 1,) the try of a step in which a pair has points by that; last: this one
     measured: I1  # (pairs,) 1 + list of near pairs in which its rows were measured, 0: none
     impulse: F1  # (ny,) impulses on bodies, then what they change of velocities
+    six: F3  # (nb, 6, 6) six impulses on bodies, then what they change, if joints hold any
+    shares: F3  # (nb, 6, 6) of joints in them
     middle: F1  # (ny,) state within a step at which forces are found
     midst: F1  # (ny,) state in the midst of a step at which joints hold, see `forces`
     aside: F1  # (ny,) that, bodies moved along what an impact does to their ways
@@ -365,6 +367,8 @@ def make(
         taken=whole(pairs + 1),
         measured=whole(pairs),
         impulse=numbers(ny),
+        six=numbers(nb if len(plan.members) > 0 else 0, 6, 6),
+        shares=numbers(nb if len(plan.members) > 0 else 0, 6, 6),
         middle=numbers(ny),
         midst=numbers(ny),
         aside=numbers(ny),

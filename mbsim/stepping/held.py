@@ -2,7 +2,8 @@
 
 An impulse moves all bodies of a group then. What it does to them takes a solution of the group's
 linear system, for each of its three components; or, where a body has many points, for each of the
-six components of a wrench on the body, of which the impulses of all its points are made.
+six components of a wrench on the body, of which the impulses of all its points are made. Where the
+tree of joints is all that holds them, the impulses of two points are answered at once.
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ from mbsim.arrays.hooks import Hook, Joints, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
+from mbsim.dynamics.constraints.impulses import answer_six
+from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.stepping.arrays import ALL_ANSWERS, POINTS, Stepping
 from mbsim.stepping.implicit import is_implicit, yield_to_forces
 from mbsim.stepping.one_point import alone, direction
@@ -134,10 +137,71 @@ def add_answer(S: Stepping, k: int, side: int, a: int) -> None:
 
 
 @jitable
+def comes_in_six(scene: Scene, S: Stepping) -> bool:
+    """Return whether what impulses do is found for six at once: the tree of joints is all."""
+    return active_count(scene) == 0 and not is_implicit(S)
+
+
+@jitable
+def root_of(scene: Scene, S: Stepping, b: int) -> int:
+    """Return the root of a body's tree, -1 if no joint holds it."""
+    return scene.tree.root[scene.tree.of_body[b]] if S.plan.group[b] >= 0 else -1
+
+
+@jitable
+def answer_points(scene: Scene, S: Stepping, first: int, second: int) -> None:
+    """Fill what impulses at two points do, whose bodies are listed; `second` may be `first`."""
+    P, plan, six = S.points, S.plan, S.motion.six
+    i, j, m, n = P.body[first, 0], P.body[first, 1], P.body[second, 0], P.body[second, 1]
+    roots = root_of(scene, S, i), root_of(scene, S, j), root_of(scene, S, m), root_of(scene, S, n)
+    for k in (first, second):
+        for row in range(P.wide[k], P.wide[k] + P.many[k]):
+            for c in range(6):
+                for e in range(6):
+                    six[P.moved[row], c, e] = 0.0
+    for part in range(2):
+        k = first if part == 0 else second
+        for side in range(2):
+            b = P.body[k, side]
+            if plan.group[b] >= 0:
+                for a in range(3):
+                    for c in range(6):
+                        six[b, c, 3 * part + a] += direction(P, k, side, a, c)
+    answer_six(scene, roots, six, S.motion.shares)
+    S.tally.count[ALL_ANSWERS] += 6 if second != first else 3
+    for part in range(2):
+        k = first if part == 0 else second
+        for row in range(P.wide[k], P.wide[k] + P.many[k]):
+            b, moves = P.moved[row], P.moves[row]
+            side = 0 if b == P.body[k, 0] else 1
+            for c in range(6):
+                for a in range(3):
+                    held = plan.group[b] >= 0
+                    moves[c, a] = six[b, c, 3 * part + a] if held else alone(P, k, side, a, c)
+
+
+@jitable
+def answer_listed(scene: Scene, S: Stepping) -> None:
+    """Fill what impulses do at all points of held bodies that `widen` has listed alone."""
+    P, before = S.points, -1
+    if not comes_in_six(scene, S):
+        return
+    for k in range(S.tally.count[POINTS]):
+        if P.wide[k] >= 0:
+            if before >= 0:
+                answer_points(scene, S, before, k)
+                before = -1
+            else:
+                before = k
+    if before >= 0:
+        answer_points(scene, S, before, before)
+
+
+@jitable
 def widen(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
     """Fill what impulses at point k do where joints or forces hold its bodies: rows from `begin`.
 
-    Return False if there is no room.
+    Where that comes in six it is left to `answer_listed`. Return False if there is no room.
     """
     P, plan, impulse = S.points, S.plan, S.motion.impulse
     P.wide[k] = -1
@@ -146,6 +210,8 @@ def widen(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
     P.wide[k] = begin
     if not list_moved(S, k):
         return False
+    if comes_in_six(scene, S):
+        return True
     known = (
         plan.group[P.body[k, 0]] >= 0 and answer_body(scene, S, P.body[k, 0]),
         plan.group[P.body[k, 1]] >= 0 and answer_body(scene, S, P.body[k, 1]),

@@ -30,7 +30,7 @@ from mbsim.stepping.arrays import (
     W_ZZ,
     Stepping,
 )
-from mbsim.stepping.held import widen
+from mbsim.stepping.held import answer_listed, widen
 from mbsim.stepping.one_point import answer_of, fill_inverse, velocity_of
 
 #: Part of a step's motion by which pairs are looked for beyond it: others may hit what moves.
@@ -193,31 +193,38 @@ def put_side(
 
 @jitable
 def fill_point(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
-    """Fill what the solver reads of point k, and its closing speed; False if no room.
+    """Fill the axes of point k, what it does to its bodies and its closing speed; False if no room.
 
-    `begin` is the first of the wide rows that are not in use.
+    `begin` is the first of the wide rows that are not in use. What held bodies answer is found
+    behind this.
     """
     P, row = S.points, S.points.given[k]
     n, x = vector(P.normal[k]), vector(P.tangent[k])
     axes = (n, x, cross(n, x))
     put_three(row, AXES, axes[0], axes[1], axes[2])
     i, j = put_side(S, k, 0, axes), put_side(S, k, 1, axes)
-    if not widen(scene, S, k, begin):
-        return False
-    if P.wide[k] < 0:
-        for c in range(6):
-            row[W_NN + c] = i[c] + j[c]
-    else:
-        row[W_NN], row[W_NX], row[W_NZ] = (
-            answer_of(P, k, 0, 0),
-            answer_of(P, k, 0, 1),
-            answer_of(P, k, 0, 2),
-        )
-        row[W_XX], row[W_XZ], row[W_ZZ] = (
-            answer_of(P, k, 1, 1),
-            answer_of(P, k, 1, 2),
-            answer_of(P, k, 2, 2),
-        )
-    fill_inverse(row)
+    for c in range(6):
+        row[W_NN + c] = i[c] + j[c]
     P.closing[k] = velocity_of(P, k, 0, S.motion.before)
-    return True
+    return widen(scene, S, k, begin)
+
+
+@jitable
+def fill_answers(scene: Scene, S: Stepping) -> None:
+    """Fill W of all points, and its inverse."""
+    P = S.points
+    answer_listed(scene, S)
+    for k in range(S.tally.count[POINTS]):
+        row = P.given[k]
+        if P.wide[k] >= 0:
+            row[W_NN], row[W_NX], row[W_NZ] = (
+                answer_of(P, k, 0, 0),
+                answer_of(P, k, 0, 1),
+                answer_of(P, k, 0, 2),
+            )
+            row[W_XX], row[W_XZ], row[W_ZZ] = (
+                answer_of(P, k, 1, 1),
+                answer_of(P, k, 1, 2),
+                answer_of(P, k, 2, 2),
+            )
+        fill_inverse(row)

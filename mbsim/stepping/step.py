@@ -80,7 +80,7 @@ from mbsim.stepping.kept import index_kept, recall
 from mbsim.stepping.near_pairs import FARTHER, list_anew
 from mbsim.stepping.one_point import apply, velocity_of
 from mbsim.stepping.pairs import find_missed, find_points
-from mbsim.stepping.points import fill_point, fill_reach, way_at
+from mbsim.stepping.points import fill_answers, fill_point, fill_reach, way_at
 from mbsim.stepping.rebound import limit_rebound
 from mbsim.stepping.sleep import wake_loaded
 from mbsim.stepping.solver import project_positions, solve_points
@@ -245,6 +245,7 @@ def prepare_points(scene: Scene, S: Stepping, h: float) -> int:
         if not fill_point(scene, S, k, begin):
             return Code.MANY_POINTS
         begin += P.many[k] if P.wide[k] >= 0 else 0
+    fill_answers(scene, S)
     recall(S, h)
     for k in range(count):
         x, z = velocity_of(P, k, 1, M.before), velocity_of(P, k, 2, M.before)

@@ -17,7 +17,7 @@ DMAX = 1e-5  # m, of IMPACT's damper
 #: Our reference: STICTION's law and this method and tolerance.
 EXACT = ("RADAU5", 1e-8)
 #: Fixed steps of MOREAU [s]; without one it finds them by error.
-STEPS = (1e-2, 5e-3, 2e-3, 1e-3)
+STEPS = (2e-2, 1e-2, 5e-3, 2e-3, 1e-3)
 
 
 def _driven(k: int, link: Link) -> list[str]:

@@ -42,7 +42,7 @@ from mbsim.dynamics.constraints.tree_projection import (
 )
 
 #: Rounds of Newton's method at most, and what is left of a body's size where it ends.
-MOST_ROUNDS, NEAR = 4, 1e-9
+MOST_ROUNDS, NEAR = 4, 1e-7
 
 
 @jitable

@@ -42,11 +42,10 @@ from mbsim.dynamics.constraints.projection import (
     push,
     speed_up,
 )
-from mbsim.dynamics.constraints.reactions import fill_reactions, show_sticking
+from mbsim.dynamics.constraints.reactions import add_tree_reactions, fill_reactions, show_sticking
 from mbsim.dynamics.constraints.selection import LEFT, choose, fill_size, keep_selection, use_all
 from mbsim.dynamics.constraints.tree import load, prepare, respond, write_accelerations
 from mbsim.dynamics.constraints.tree_projection import project_tree, project_tree_velocities
-from mbsim.dynamics.constraints.tree_reactions import add_tree_reactions
 from mbsim.dynamics.pipeline.audit import examine_equations, examine_fold
 
 
