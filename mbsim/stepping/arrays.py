@@ -112,6 +112,7 @@ class Plan(NamedTuple):
     # (nb + 1,) of bodies that joints hold together or forces couple, -1 for free ones and ground
     group: I1
     members: I1  # (nb,) those bodies, group by group
+    place: I1  # (nb + 1,) of a body within its group
     first: I1  # (groups + 1,) of each group's
     force: I1  # (3,) how forces are implicit, see `implicit`
 
@@ -168,6 +169,7 @@ class Points(NamedTuple):
     given: F2  # (m, GIVEN) what the solver reads of the point, see above
     wide: I1  # (m,) else first row of `moved`, -1 where they do not
     many: I1  # (m,) its rows there
+    near: I1  # (m,) the first ones of them, of bodies that have points themselves
     moved: I1  # (wide rows,) bodies that r moves
     moves: F3  # (wide rows, 6, 3) their velocities by r
     touches: I1  # (nb,) points of a body that joints or forces hold, see `held`
@@ -306,6 +308,7 @@ def no_points(m: int, nb: int, wide: int) -> Points:
         given=numbers(m, GIVEN),
         wide=whole(m),
         many=whole(m),
+        near=whole(m),
         moved=whole(wide),
         moves=numbers(wide, 6, 3),
         touches=whole(nb),

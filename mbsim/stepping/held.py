@@ -12,7 +12,7 @@ from mbsim.arrays.hooks import Hook, Joints, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
-from mbsim.dynamics.constraints.impulses import answer_six
+from mbsim.dynamics.constraints.impulses import answer_six, clear_six
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.stepping.arrays import ALL_ANSWERS, POINTS, Stepping
 from mbsim.stepping.implicit import is_implicit, yield_to_forces
@@ -96,23 +96,36 @@ def add_moved(S: Stepping, k: int, b: int) -> bool:
 
 
 @jitable
+def list_group(S: Stepping, k: int, b: int, near: bool) -> bool:
+    """Let all bodies of b's group that have points, or that have none, be moved by point k.
+
+    Of b alone if nothing holds it. Return False if there is no room.
+    """
+    P, plan = S.points, S.plan
+    g = plan.group[b]
+    if g < 0:
+        return not near or b == len(S.motion.inverse) or add_moved(S, k, b)
+    for m in range(plan.first[g], plan.first[g + 1]):
+        if (P.touches[plan.members[m]] > 0) == near and not add_moved(S, k, plan.members[m]):
+            return False
+    return True
+
+
+@jitable
 def list_moved(S: Stepping, k: int) -> bool:
-    """Fill which bodies point k moves, behind those of the points before; False if no room."""
+    """Fill which bodies point k moves, behind those of the points before; False if no room.
+
+    Those with points come first: the solver asks no others.
+    """
     P, plan = S.points, S.plan
     P.many[k] = 0
     i, j = P.body[k, 0], P.body[k, 1]
-    for side in range(2):
-        b = i if side == 0 else j
-        g = plan.group[b]
-        if g < 0:
-            if b < len(S.motion.inverse) and not add_moved(S, k, b):
-                return False
-            continue
-        if side == 1 and g == plan.group[i]:
-            continue
-        for m in range(plan.first[g], plan.first[g + 1]):
-            if not add_moved(S, k, plan.members[m]):
-                return False
+    both = plan.group[j] < 0 or plan.group[j] != plan.group[i]
+    for part in range(2):
+        if not list_group(S, k, i, part == 0) or (both and not list_group(S, k, j, part == 0)):
+            return False
+        if part == 0:
+            P.near[k] = P.many[k]
     return True
 
 
@@ -121,19 +134,15 @@ def add_answer(S: Stepping, k: int, side: int, a: int) -> None:
     """Add what r_a of point k does by its wrench on a held body whose answer is known."""
     P, plan, b = S.points, S.plan, S.points.body[k, side]
     g = plan.group[b]
-    # the group of I comes first, then that of J if it is another one, or J alone
-    before = P.wide[k]
-    if side == 1 and g != plan.group[P.body[k, 0]]:
-        i = plan.group[P.body[k, 0]]
-        before += plan.first[i + 1] - plan.first[i] if i >= 0 else 0
-        before += 1 if i < 0 and P.body[k, 0] < len(S.motion.inverse) else 0
-    for e in range(6):
-        part = direction(P, k, side, a, e)
-        if part == 0.0:
+    for row in range(P.wide[k], P.wide[k] + P.many[k]):
+        m = P.moved[row]
+        if plan.group[m] != g:
             continue
-        for row in range(plan.first[g + 1] - plan.first[g]):
+        answer = P.answers[P.answer[b] + plan.place[m]]
+        for e in range(6):
+            part = direction(P, k, side, a, e)
             for c in range(6):
-                P.moves[before + row, c, a] += part * P.answers[P.answer[b] + row, c, e]
+                P.moves[row, c, a] += part * answer[c, e]
 
 
 @jitable
@@ -156,9 +165,7 @@ def answer_points(scene: Scene, S: Stepping, first: int, second: int) -> None:
     roots = root_of(scene, S, i), root_of(scene, S, j), root_of(scene, S, m), root_of(scene, S, n)
     for k in (first, second):
         for row in range(P.wide[k], P.wide[k] + P.many[k]):
-            for c in range(6):
-                for e in range(6):
-                    six[P.moved[row], c, e] = 0.0
+            clear_six(six[P.moved[row]])
     for part in range(2):
         k = first if part == 0 else second
         for side in range(2):
@@ -173,11 +180,16 @@ def answer_points(scene: Scene, S: Stepping, first: int, second: int) -> None:
         k = first if part == 0 else second
         for row in range(P.wide[k], P.wide[k] + P.many[k]):
             b, moves = P.moved[row], P.moves[row]
+            if plan.group[b] >= 0:
+                found, e = six[b], 3 * part
+                for c in range(6):
+                    moves[c, 0], moves[c, 1] = found[c, e], found[c, e + 1]
+                    moves[c, 2] = found[c, e + 2]
+                continue
             side = 0 if b == P.body[k, 0] else 1
             for c in range(6):
                 for a in range(3):
-                    held = plan.group[b] >= 0
-                    moves[c, a] = six[b, c, 3 * part + a] if held else alone(P, k, side, a, c)
+                    moves[c, a] = alone(P, k, side, a, c)
 
 
 @jitable

@@ -62,9 +62,9 @@ def velocity_of(p: Points, k: int, a: int, v: F2) -> float:
 
 @jitable
 def apply(p: Points, k: int, v: F2, r: V3) -> None:
-    """Add what an impulse at point k does to the velocities of the bodies that it moves."""
+    """Add what an impulse at point k does to the velocities of bodies that have points."""
     if p.wide[k] >= 0:
-        for row in range(p.wide[k], p.wide[k] + p.many[k]):
+        for row in range(p.wide[k], p.wide[k] + p.near[k]):
             b, moves = p.moved[row], p.moves[row]
             for c in range(6):
                 v[b, c] += moves[c, 0] * r[0] + moves[c, 1] * r[1] + moves[c, 2] * r[2]
@@ -96,6 +96,16 @@ def apply(p: Points, k: int, v: F2, r: V3) -> None:
 
 
 @jitable
+def apply_farther(p: Points, k: int, v: F2, r: V3) -> None:
+    """Add what an impulse at point k does to the velocities of bodies without points."""
+    if p.wide[k] >= 0:
+        for row in range(p.wide[k] + p.near[k], p.wide[k] + p.many[k]):
+            b, moves = p.moved[row], p.moves[row]
+            for c in range(6):
+                v[b, c] += moves[c, 0] * r[0] + moves[c, 1] * r[1] + moves[c, 2] * r[2]
+
+
+@jitable
 def direction(p: Points, k: int, side: int, a: int, c: int) -> float:
     """Return the part in u_a at point k of component c of the velocity of one of its bodies."""
     row, sign = p.given[k], 1.0 - 2.0 * side
@@ -115,7 +125,7 @@ def alone(p: Points, k: int, side: int, a: int, c: int) -> float:
 def answer_of(p: Points, k: int, a: int, e: int) -> float:
     """Return u_a by r_e at point k, where joints hold its bodies."""
     total = 0.0
-    for at in range(p.wide[k], p.wide[k] + p.many[k]):
+    for at in range(p.wide[k], p.wide[k] + p.near[k]):
         for side in range(2):
             if p.moved[at] == p.body[k, side]:
                 for c in range(6):

@@ -189,7 +189,9 @@ def _plan(system: System, fixed: bool, tol: float, coupled: list[set[int]], forc
     sources = [model.transient, *(simulation.transient for simulation in model.simulations)]
     awake = any(source is not None and source.sleep is False for source in sources)
     number[MAY_SLEEP] = float(not awake)
-    return Plan(number, near, rows, group, members, first, force)
+    place = np.zeros(len(group), dtype=np.int64)
+    place[members] = np.arange(len(members)) - first[group[members]]
+    return Plan(number, near, rows, group, members, place, first, force)
 
 
 def _groups(system: System, coupled: list[set[int]]) -> tuple[Indices, Indices, Indices]:

@@ -22,7 +22,7 @@ from mbsim.core.arrays import F2, I1
 from mbsim.core.jitable import jitable
 from mbsim.fclib.bodies.solve import solve_contacts
 from mbsim.stepping.arrays import ALONG, W_NN, W_XX, W_ZZ, Motion, Points
-from mbsim.stepping.one_point import apply, fill_directions, solve_point, velocity_of
+from mbsim.stepping.one_point import apply, apply_farther, fill_directions, solve_point, velocity_of
 
 #: Sweeps before Newton's method of up to `FEW_POINTS` points, and of more points and behind it, at
 #: most. An iteration of Newton's method takes as long as tens of sweeps: stacks want few of them,
@@ -73,7 +73,7 @@ def pressing(p: Points, count: int) -> int:
 def note_change(p: Points, changed: I1, k: int, number: int) -> None:
     """Note that sweep `number` changed the bodies that point k moves; ground never changes."""
     if p.wide[k] >= 0:
-        for row in range(p.wide[k], p.wide[k] + p.many[k]):
+        for row in range(p.wide[k], p.wide[k] + p.near[k]):
             changed[p.moved[row]] = number
         return
     ground = len(changed) - 1
@@ -317,6 +317,17 @@ def solve_points(
 
 
 @jitable
+def move_farther(p: Points, M: Motion, count: int) -> None:
+    """Fill velocities of bodies that joints or forces hold, and that have no points: v_free + r's.
+
+    Until then they are v_free.
+    """
+    for k in range(count):
+        if p.r[k, 0] != 0.0:
+            apply_farther(p, k, M.v, (p.r[k, 0], p.r[k, 1], p.r[k, 2]))
+
+
+@jitable
 def project_positions(p: Points, shift: F2, count: int, h: float, most: float) -> int:
     """Change displacements over h so that no point ends deeper than its slop; return the sweeps.
 
@@ -342,4 +353,7 @@ def project_positions(p: Points, shift: F2, count: int, h: float, most: float) -
             apply(p, k, shift, (change, 0.0, 0.0))
             worst = max(worst, abs(change) * p.given[k, W_NN] * h / p.slop[k])
         sweeps += 1
+    for k in range(count):
+        if p.push[k] != 0.0:
+            apply_farther(p, k, shift, (p.push[k], 0.0, 0.0))
     return sweeps

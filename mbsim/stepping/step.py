@@ -83,7 +83,7 @@ from mbsim.stepping.pairs import find_missed, find_points
 from mbsim.stepping.points import fill_answers, fill_point, fill_reach, way_at
 from mbsim.stepping.rebound import limit_rebound
 from mbsim.stepping.sleep import wake_loaded
-from mbsim.stepping.solver import project_positions, solve_points
+from mbsim.stepping.solver import move_farther, project_positions, solve_points
 
 #: How often a step is solved at most, as what stuck slips.
 MOST_YIELDS = 6
@@ -317,6 +317,7 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
     if not math.isfinite(more_left):
         return Code.NOT_FINITE
     left = max(left, more_left)
+    move_farther(P, M, count)
     sweeps += more
     tally.count[NEWTONS] += newtons
     spread_parts(scene, S, count, h, slop)

@@ -7,7 +7,7 @@ equations take away what that would change of them, G dV = 0. All is as `hold` l
 from __future__ import annotations
 
 from mbsim.arrays.scene import Scene
-from mbsim.core.arrays import F1, F3
+from mbsim.core.arrays import F1, F2, F3, V3, V6
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, vector
 from mbsim.dynamics.constraints.equations import (
@@ -18,7 +18,9 @@ from mbsim.dynamics.constraints.equations import (
 )
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.projection import prepare_equations
-from mbsim.dynamics.constraints.tree import respond
+from mbsim.dynamics.constraints.tree import plus, respond, six
+
+NONE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @jitable
@@ -57,17 +59,48 @@ def answer_tree(scene: Scene, wrench: F1) -> None:
 
 
 @jitable
+def keep_six(row: F1, a: V6) -> None:
+    """Write six numbers into a row."""
+    row[0], row[1], row[2], row[3], row[4], row[5] = a
+
+
+@jitable
+def clear_six(wrench: F2) -> None:
+    """Let six impulses on a body be none."""
+    for c in range(6):
+        keep_six(wrench[c], NONE)
+
+
+@jitable
+def is_none(wrench: F2) -> bool:
+    """Return whether six impulses on a body are none."""
+    total = 0.0
+    for c in range(6):
+        row = wrench[c]
+        total += abs(row[0]) + abs(row[1]) + abs(row[2]) + abs(row[3]) + abs(row[4]) + abs(row[5])
+    return total == 0.0
+
+
+@jitable
+def cross_row(r: V3, i: int, x: F2, at: int) -> V6:
+    """Return component i of r x v for six v, whose components are the rows of x from `at` on."""
+    a, b = (i + 1) % 3, (i + 2) % 3
+    return plus(plus(NONE, r[a], six(x[at + b])), -r[b], six(x[at + a]))
+
+
+@jitable
 def load_six(scene: Scene, k: int, wrench: F3) -> None:
     """Replace six impulses on the body at tree index k, about its cg, by forces p about O."""
     w, r = wrench[scene.tree.body[k]], vector(scene.sweep.arm[k])
-    for e in range(6):
-        x, y, z = w[0, e], w[1, e], w[2, e]
-        w[0, e], w[1, e], w[2, e] = (
-            -(w[3, e] + r[1] * z - r[2] * y),
-            -(w[4, e] + r[2] * x - r[0] * z),
-            -(w[5, e] + r[0] * y - r[1] * x),
-        )
-        w[3, e], w[4, e], w[5, e] = -x, -y, -z
+    x, y, z = cross_row(r, 0, w, 0), cross_row(r, 1, w, 0), cross_row(r, 2, w, 0)
+    x, y, z = plus(x, 1.0, six(w[3])), plus(y, 1.0, six(w[4])), plus(z, 1.0, six(w[5]))
+    f, g, h = six(w[0]), six(w[1]), six(w[2])
+    keep_six(w[0], plus(NONE, -1.0, x))
+    keep_six(w[1], plus(NONE, -1.0, y))
+    keep_six(w[2], plus(NONE, -1.0, z))
+    keep_six(w[3], plus(NONE, -1.0, f))
+    keep_six(w[4], plus(NONE, -1.0, g))
+    keep_six(w[5], plus(NONE, -1.0, h))
 
 
 @jitable
@@ -76,26 +109,24 @@ def pass_six_up(scene: Scene, k: int, wrench: F3, z: F3) -> None:
     sweep, tree = scene.sweep, scene.tree
     S, W, L, b = sweep.S[k], sweep.W[k], sweep.L[k], tree.body[k]
     p, share, parent = wrench[b], z[b], tree.parent[k]
-    for q in range(tree.free[k]):
-        for e in range(6):
-            total = 0.0
-            for i in range(6):
-                total -= S[q, i] * p[i, e]
-            share[q, e] = total
-        for j in range(q):
-            for e in range(6):
-                share[q, e] -= L[q, j] * share[j, e]
-        for e in range(6):
-            share[q, e] /= L[q, q]
-    if parent < 0:
-        return
-    above = wrench[tree.body[parent]]
-    for i in range(6):
-        for e in range(6):
-            above[i, e] += p[i, e]
+    if is_none(p):
         for q in range(tree.free[k]):
-            for e in range(6):
-                above[i, e] += W[q, i] * share[q, e]
+            keep_six(share[q], NONE)
+        return
+    for q in range(tree.free[k]):
+        total = NONE
+        for i in range(6):
+            total = plus(total, -S[q, i], six(p[i]))
+        for j in range(q):
+            total = plus(total, -L[q, j], six(share[j]))
+        keep_six(share[q], plus(NONE, 1.0 / L[q, q], total))
+    if parent >= 0:
+        above = wrench[tree.body[parent]]
+        for i in range(6):
+            up = plus(six(above[i]), 1.0, six(p[i]))
+            for q in range(tree.free[k]):
+                up = plus(up, W[q, i], six(share[q]))
+            keep_six(above[i], up)
 
 
 @jitable
@@ -105,22 +136,37 @@ def pass_six_down(scene: Scene, k: int, wrench: F3, z: F3) -> None:
     S, W, L, b, free = sweep.S[k], sweep.W[k], sweep.L[k], tree.body[k], tree.free[k]
     a, share, parent = wrench[b], z[b], tree.parent[k]
     for i in range(6):
-        for e in range(6):
-            a[i, e] = wrench[tree.body[parent], i, e] if parent >= 0 else 0.0
+        keep_six(a[i], six(wrench[tree.body[parent], i]) if parent >= 0 else NONE)
     for q in range(free):
+        left = six(share[q])
         for i in range(6):
-            for e in range(6):
-                share[q, e] -= W[q, i] * a[i, e]
+            left = plus(left, -W[q, i], six(a[i]))
+        keep_six(share[q], left)
     for q in range(free - 1, -1, -1):
+        left = six(share[q])
         for j in range(q + 1, free):
-            for e in range(6):
-                share[q, e] -= L[j, q] * share[j, e]
-        for e in range(6):
-            share[q, e] /= L[q, q]
-    for q in range(free):
-        for i in range(6):
-            for e in range(6):
-                a[i, e] += S[q, i] * share[q, e]
+            left = plus(left, -L[j, q], six(share[j]))
+        keep_six(share[q], plus(NONE, 1.0 / L[q, q], left))
+    for i in range(6):
+        moved = six(a[i])
+        for q in range(free):
+            moved = plus(moved, S[q, i], six(share[q]))
+        keep_six(a[i], moved)
+
+
+@jitable
+def unload_six(scene: Scene, k: int, wrench: F3) -> None:
+    """Replace six spatial velocities at tree index k by those of the body's cg, and of its spin."""
+    D, r = wrench[scene.tree.body[k]], vector(scene.sweep.arm[k])
+    # v = v_O + w x r
+    x, y, z = cross_row(r, 0, D, 0), cross_row(r, 1, D, 0), cross_row(r, 2, D, 0)
+    x, y, z = plus(six(D[3]), -1.0, x), plus(six(D[4]), -1.0, y), plus(six(D[5]), -1.0, z)
+    keep_six(D[3], six(D[0]))
+    keep_six(D[4], six(D[1]))
+    keep_six(D[5], six(D[2]))
+    keep_six(D[0], x)
+    keep_six(D[1], y)
+    keep_six(D[2], z)
 
 
 @jitable
@@ -142,13 +188,7 @@ def answer_six(scene: Scene, roots: tuple[int, int, int, int], wrench: F3, z: F3
             pass_six_down(scene, k, wrench, z)
     for k in range(n):
         if tree.root[k] in roots:
-            D, r = wrench[tree.body[k]], vector(scene.sweep.arm[k])
-            for e in range(6):
-                x, y, w = D[0, e], D[1, e], D[2, e]
-                D[0, e] = D[3, e] + y * r[2] - w * r[1]
-                D[1, e] = D[4, e] + w * r[0] - x * r[2]
-                D[2, e] = D[5, e] + x * r[1] - y * r[0]
-                D[3, e], D[4, e], D[5, e] = x, y, w
+            unload_six(scene, k, wrench)
 
 
 @jitable
