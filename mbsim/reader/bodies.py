@@ -98,7 +98,7 @@ def _build_body(entry: Entry) -> None:
     if body.density is not None and body.mass is not None:
         what = "" if body.cg_id is not None else ", but lets the graphics give the centre of mass"
         entry.note(f"has no effect on the mass where mass is given{what}", "density")
-    entry.register(entry.draft.bodies, body)
+    entry.register("bodies", body)
 
 
 def _from_cosines(entry: Entry) -> el.Array:
@@ -154,7 +154,7 @@ def _build_marker(entry: Entry) -> None:
         R=_orientation(entry),
         source=entry.source,
     )
-    entry.register(entry.draft.markers, marker)
+    entry.register("markers", marker)
 
 
 def _about_inertia(name: str) -> str:

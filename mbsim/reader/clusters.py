@@ -41,7 +41,7 @@ def _build_cluster(entry: Entry) -> None:
     cluster = PlanarCluster(
         entry.get("id", 0), entry.get("planar_type", "XY"), bodies, entry.source
     )
-    entry.register(entry.draft.clusters, cluster)
+    entry.register("clusters", cluster)
 
 
 def _build_planar(entry: Entry) -> None:

@@ -70,7 +70,7 @@ def _build_joint(entry: Entry) -> None:
         length=entry.get("length"),
         source=entry.source,
     )
-    entry.register(entry.draft.joints, joint)
+    entry.register("joints", joint)
 
 
 def _kind(entry: Entry, name: str) -> str:
@@ -90,7 +90,7 @@ def _build_primitive(entry: Entry) -> None:
         is_primitive=True,
         source=entry.source,
     )
-    entry.register(entry.draft.primitives, joint)
+    entry.register("primitives", joint)
 
 
 def _build_coupler(entry: Entry) -> None:
@@ -124,7 +124,7 @@ def _build_coupler(entry: Entry) -> None:
         user=None if user is None else relation(user, len(ids)),
         source=entry.source,
     )
-    entry.register(entry.draft.couplers, coupler)
+    entry.register("couplers", coupler)
 
 
 def _relation(entry: Entry, needed: list[str], scales: str) -> el.Subroutine | None:
@@ -170,7 +170,7 @@ def _build_coupler_by_joint(entry: Entry) -> None:
         user=None if user is None else relation(user, len(ids)),
         source=entry.source,
     )
-    entry.register(entry.draft.couplers, coupler)
+    entry.register("couplers", coupler)
 
 
 def _build_general(entry: Entry) -> None:
@@ -181,7 +181,7 @@ def _build_general(entry: Entry) -> None:
     constraint = el.GeneralConstraint(
         id=entry.get("id", 0), expr=expr, label=entry.get("label", ""), source=entry.source
     )
-    entry.register(entry.draft.general_constraints, constraint)
+    entry.register("general_constraints", constraint)
 
 
 def note_unused_starts(entry: Entry, val_type: str, disp: str, vel: str) -> None:
@@ -222,7 +222,7 @@ def _build_motion(entry: Entry) -> None:
         first = f"{other.statement} on line {other.source.line}"
         entry.fault(f"id already used by a {first}; motions share their ids", "id")
         return
-    entry.register(entry.draft.motions, motion)
+    entry.register("motions", motion)
 
 
 def complete_motions(draft: Draft) -> None:

@@ -104,7 +104,7 @@ def _build_contact(entry: Entry) -> None:
         cnf=cnf,
         cpost=cpost,
     )
-    entry.register(entry.draft.contacts, contact)
+    entry.register("contacts", contact)
 
 
 def _by_name(entry: Entry, but: set[str]) -> dict[str, Any]:

@@ -42,7 +42,7 @@ def _build_siso(entry: Entry) -> None:
         is_static_hold=entry.get("is_static_hold", False),
         source=entry.source,
     )
-    entry.register(entry.draft.control.systems.setdefault("Control_SISO", {}), system)
+    entry.register_in(entry.draft.control.systems.setdefault("Control_SISO", {}), system)
 
 
 CONTROL_SISO = Statement(

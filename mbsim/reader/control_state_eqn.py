@@ -78,7 +78,7 @@ def _keep(entry: Entry, matrices: dict[str, Any], user: Subroutine | None = None
         counts={"x": entry.get("num_state"), "y": entry.get("num_output")},
         source=entry.source,
     )
-    entry.register(entry.draft.control.systems.setdefault("Control_StateEqn", {}), system)
+    entry.register_in(entry.draft.control.systems.setdefault("Control_StateEqn", {}), system)
 
 
 CONTROL_STATE_EQN = Statement(

@@ -44,7 +44,7 @@ def _build_differential(entry: Entry) -> None:
         label=entry.get("label", ""),
         source=entry.source,
     )
-    entry.register(entry.draft.differentials, differential)
+    entry.register("differentials", differential)
 
 
 CONTROL_DIFF = Statement(
@@ -76,7 +76,7 @@ def add_sensor(entry: Entry, sensor: el.Sensor) -> None:
         entry.warn("has no action: it only notes when it becomes true")
     if sensor.compare == "EQ" and not sensor.zero_crossing and sensor.error_tol == 0.0:
         entry.warn("compare EQ without error_tol and zero_crossing: only a change of sign is seen")
-    entry.register(entry.draft.sensors, sensor)
+    entry.register("sensors", sensor)
 
 
 def _build_sensor(entry: Entry) -> None:
@@ -113,7 +113,7 @@ def _build_evaluation(entry: Entry) -> None:
     if expr is not None:
         label = entry.get("label", "")
         evaluation = el.Evaluation(entry.get("id", 0), expr, user, label, entry.source)
-        entry.register(entry.draft.evaluations, evaluation)
+        entry.register("evaluations", evaluation)
 
 
 def complete_sensors(draft: Draft) -> Iterator[Fault]:

@@ -47,7 +47,7 @@ def _build_curve(entry: Entry) -> None:
     if said:
         entry.fault(said, "points")
         return
-    entry.register(entry.draft.curves, curve)
+    entry.register("curves", curve)
     if by == ["matrix_id"] and entry.get("matrix_id") is not None:
         entry.draft.curve_matrices[curve.id] = entry.get("matrix_id")
 
@@ -107,7 +107,7 @@ def _build_point(entry: Entry) -> None:
         label=entry.get("label", ""),
         source=entry.source,
     )
-    entry.register(entry.draft.points_on_curves, point)
+    entry.register("points_on_curves", point)
 
 
 def _build_touching(entry: Entry) -> None:
@@ -131,7 +131,7 @@ def _build_touching(entry: Entry) -> None:
         label=entry.get("label", ""),
         source=entry.source,
     )
-    entry.register(entry.draft.curves_on_curves, pair)
+    entry.register("curves_on_curves", pair)
 
 
 _SUBROUTINE = "CURSUB is documented but not built yet; give points or matrix_id"

@@ -117,7 +117,7 @@ def add_force(
         parameters=tuple(values.items()),
         source=entry.source,
     )
-    entry.register(entry.draft.marker_forces.setdefault(kind.name, {}), force)
+    entry.register_in(entry.draft.marker_forces.setdefault(kind.name, {}), force)
 
 
 class _Given:
@@ -190,7 +190,7 @@ def _build_own(kind: ForceKind, reading: Reading) -> Callable[[Entry], None]:
         if found is not None:
             id, label = entry.get("id", 0), entry.get("label", "")
             element = made(id=id, label=label, source=entry.source, **found)
-            entry.register(getattr(entry.draft, kind.table), element)
+            entry.register_in(getattr(entry.draft, kind.table), element)
 
     return build
 

@@ -89,7 +89,7 @@ def _build_gear(entry: Entry) -> None:
     if first is None or second is None or cv is None:
         return
     gear = GearDraft(entry.get("id", 0), (first, second), cv, entry.get("label", ""), entry.source)
-    entry.register(entry.draft.gears, gear)
+    entry.register("gears", gear)
 
 
 def complete_gears(draft: Draft, model: el.Model) -> Iterator[Fault]:

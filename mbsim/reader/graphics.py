@@ -138,10 +138,6 @@ def _build_graphic(entry: Entry) -> None:
             # a polyhedron is known by its corners: what is curved is measured as patches
             (vertices, faces), convex = finer, None
 
-    id = entry.get("id")
-    if id in entry.draft.display_graphics:
-        entry.fault("id already used; ids are unique per statement", "id")
-        return
     graphic = el.Graphic(
         id=entry.get("id", 0),
         label=entry.get("label", ""),
@@ -160,7 +156,7 @@ def _build_graphic(entry: Entry) -> None:
         bounds=_bounds(entry),
         source=entry.source,
     )
-    entry.register(entry.draft.graphics, graphic)
+    entry.register("graphics", graphic, "display_graphics")
 
 
 def _color(entry: Entry) -> tuple[int, int, int] | None:
@@ -256,7 +252,7 @@ def _mesh(entry: Entry) -> _Mesh | None:
         entry.fault(f'TriaMesh: file="..." or <Nodes> and <Faces>: {both}')
         return None
     if not children:
-        path = entry.draft.directory / entry.get("file", "").replace("\\", "/")
+        path = entry.beside(entry.get("file", ""))
         try:
             vertices, faces, unit, normals = load_mesh(path)
         except ModelError as error:
@@ -279,7 +275,7 @@ def _mesh(entry: Entry) -> _Mesh | None:
     bad = (indices != np.floor(indices)) | (indices < 0) | (indices >= len(nodes))
     if bad.any():
         message = f"<Faces>: {indices[bad][0]:g} is no index of {len(nodes)} nodes (from 0)"
-        entry.draft.fault(children["faces"].line, entry.label, message)
+        entry.fault_at(children["faces"].line, message)
         return None
     return _Mesh(*merge_vertices(nodes, indices.astype(np.int64)))
 
@@ -316,7 +312,7 @@ def _numbers(entry: Entry, node: Node, what: str) -> el.Array | None:
     if not message and not (np.abs(values) < 1e40).all():
         message = "values must be finite and below 1e40"
     if message:
-        entry.draft.fault(node.line, entry.label, f"<{node.tag}>: {message}")
+        entry.fault_at(node.line, f"<{node.tag}>: {message}")
         return None
     return values.reshape(-1, 3)
 

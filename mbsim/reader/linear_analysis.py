@@ -30,7 +30,7 @@ def _plant(name: str, about: str) -> Statement:
             entry.fault(f"is {count}, and {len(ids)} variables are listed", "num_element")
             return
         plant = el.Plant(entry.get("id", 0), ids, entry.get("label", ""), entry.source)
-        entry.register(entry.draft.plants.setdefault(name, {}), plant)
+        entry.register_in(entry.draft.plants.setdefault(name, {}), plant)
 
     return Statement(
         name,

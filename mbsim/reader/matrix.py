@@ -26,7 +26,7 @@ def _build_matrix(entry: Entry) -> None:
         values = _dense(entry, rows, columns, numbers)
     if values is not None:
         matrix = Matrix(entry.get("id", 0), values, entry.source)
-        entry.register(entry.draft.control.matrices, matrix)
+        entry.register_in(entry.draft.control.matrices, matrix)
 
 
 def _dense(entry: Entry, rows: int, columns: int, numbers: tuple[float, ...]) -> np.ndarray | None:

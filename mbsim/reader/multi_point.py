@@ -57,7 +57,7 @@ def _build(entry: Entry) -> None:
         label=entry.get("label", ""),
         source=entry.source,
     )
-    entry.register(entry.draft.multi_points, force)
+    entry.register("multi_points", force)
 
 
 FORCE_MULTI_POINT = Statement(

@@ -40,7 +40,7 @@ def apply_overrides(
     Parameters
     ----------
     sections : sequence of Node
-        The deck's <Model> and <Command> parts.
+        The deck's <Model> and <Command> parts. What changes of their statements becomes a copy.
     overrides : sequence of str
         ``Element[id].attribute=value``, names matched without case and `_`. A statement
         without ids is named by its place among those of its name, ``Simulate[2]``, or by
@@ -56,6 +56,7 @@ def apply_overrides(
         message says what is, a line each.
     """
     faults: list[str] = []
+    own: set[int] = set()
     for text in overrides:
         match = _FORM.fullmatch(text)
         if match is None:
@@ -63,12 +64,23 @@ def apply_overrides(
             continue
         element, index, turn, attribute, value = match.groups()
         try:
-            node = _find(sections, element, index, int(turn or 1))
+            node = _owned(_find(sections, element, index, int(turn or 1)), sections, own)
             _set(node, attribute, value.strip(), f"--set {text}", known(node))
         except LookupError as error:
             faults.append(f"--set {text}: {error.args[0]}")
     if faults:
         raise ModelError("\n".join(faults))
+
+
+def _owned(node: Node, sections: Sequence[Node], own: set[int]) -> Node:
+    """Return a statement's copy, put in its place; itself where it is one, or a section."""
+    if id(node) in own or any(node is section for section in sections):
+        return node
+    copy = node.copy()
+    own.add(id(copy))
+    for section in sections:
+        section.children[:] = [copy if child is node else child for child in section.children]
+    return copy
 
 
 def _statements(sections: Sequence[Node]) -> Iterator[Node]:

@@ -13,6 +13,7 @@ import unicodedata
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 from lxml import etree
 
@@ -64,7 +65,7 @@ class Node:
     """One element: `tag` as written, attributes in order, `text` without that of its children.
 
     `comments` are those between what stands before it and its tag, `last_comments` those between
-    its last child and its end.
+    its last child and its end. A tree that is kept has with it what `reader.statement` found.
     """
 
     tag: str
@@ -74,15 +75,17 @@ class Node:
     children: list[Node] = field(default_factory=list)
     comments: tuple[str, ...] = ()
     last_comments: tuple[str, ...] = ()
+    parsed: Any = field(init=False, default=None, repr=False, compare=False)
+    effect: Any = field(init=False, default=None, repr=False, compare=False)
 
     def copy(self) -> Node:
-        """Return one whose attributes may be changed, and those of its children."""
+        """Return one whose attributes may be changed; its children are the same."""
         return Node(
             self.tag,
             self.line,
             [Attribute(a.name, a.value, a.line, a.origin) for a in self.attributes],
             self.text,
-            [child.copy() for child in self.children],
+            list(self.children),
             self.comments,
             self.last_comments,
         )

@@ -27,7 +27,7 @@ def _build_point(entry: Entry) -> None:
         source=entry.source,
     )
     entry.draft.points[body.id] = ("Body_Point", entry.source)
-    entry.register(entry.draft.bodies, body)
+    entry.register("bodies", body)
 
 
 def hold_points(draft: Draft) -> None:

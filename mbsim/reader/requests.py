@@ -66,7 +66,7 @@ def _build_request(entry: Entry) -> None:
         user=user,
         source=entry.source,
     )
-    entry.register(entry.draft.requests, request)
+    entry.register("requests", request)
 
 
 POST_REQUEST = Statement(

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, TypeVar
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
 
 from mbsim.model.elements import Source
 from mbsim.reader.draft import Draft
@@ -105,14 +108,51 @@ class Statement:
         return frozenset(map(fold, self.children))
 
     def read(self, node: Node, draft: Draft) -> None:
-        """Read one element into the draft; faults go there too."""
+        """Read one element into the draft; faults go there too.
+
+        What follows from the element alone stays with its node: one that is read again, of a deck
+        that is kept (`parse.parsed`), does the same to the draft.
+        """
+        kept = node.effect
+        if kept is not None and kept.statement is self and kept.repeat(draft):
+            return
         before = len(draft.faults)
         entry = Entry(self, node, draft)
         if self.note:
-            draft.note(node.line, f"{self.name}: {self.note}")
+            entry.note(self.note)
         self.build(entry)
-        if len(draft.faults) > before and entry.get("id") is not None:
-            draft.broken.add((self.name, entry.get("id")))
+        if len(draft.faults) > before:
+            if entry.get("id") is not None:
+                draft.broken.add((self.name, entry.get("id")))
+        elif entry.alone:
+            node.effect = entry.effect()
+
+
+class Parsed(NamedTuple):
+    """The attributes of an element without a word to be said of them."""
+
+    statement: Statement
+    attributes: dict[str, Attribute]
+    values: dict[str, Any]
+
+
+class Effect(NamedTuple):
+    """What reading an element did to its draft, where that followed from the element alone."""
+
+    statement: Statement
+    said: list[tuple[str, tuple[Any, ...]]]  # methods of the draft, and what they were told
+    elements: list[tuple[tuple[str, ...], int, Any]]  # tables that have no such id, ids, elements
+
+    def repeat(self, draft: Draft) -> bool:
+        """Do it to another draft of the deck; return whether it could, as no id is used twice."""
+        for tables, id, _ in self.elements:
+            if any(id in getattr(draft, table) for table in tables):
+                return False
+        for method, given in self.said:
+            getattr(draft, method)(*given)
+        for tables, id, element in self.elements:
+            getattr(draft, tables[0])[id] = element
+        return True
 
 
 class Entry:
@@ -121,13 +161,22 @@ class Entry:
     def __init__(self, statement: Statement, node: Node, draft: Draft) -> None:
         self.statement = statement
         self.node = node
-        self.draft = draft
+        self._draft = draft
+        #: Whether nothing was looked at but the element itself.
+        self.alone = True
         self.source = Source(draft.file, node.line)
         self._attributes: dict[str, Attribute] = {}
         self._values: dict[str, Any] = {}
+        self._said: list[tuple[str, tuple[Any, ...]]] = []
+        self._elements: list[tuple[tuple[str, ...], int, Any]] = []
 
         if statement.any_attribute(node):
             return
+        kept = node.parsed
+        if kept is not None and kept.statement is statement:
+            self._attributes, self._values = kept.attributes, kept.values
+            return
+        before = len(draft.faults)
         self._collect()
         if node.children or node.text:
             self._check_content()
@@ -135,6 +184,31 @@ class Entry:
         for name in statement.required:
             if name not in self._attributes:
                 self.fault(f"{name}: missing; must be {statement.attributes[name].kind.allowed}")
+        if len(draft.faults) == before and not self._said:
+            node.parsed = Parsed(statement, self._attributes, self._values)
+
+    @property
+    def draft(self) -> Draft:
+        """What is known of the deck so far; who looks there depends on more than the element."""
+        self.alone = False
+        return self._draft
+
+    def beside(self, name: str) -> Path:
+        """Return the path of a file that the deck names; what is in it the element does not say."""
+        return self.draft.directory / name.replace("\\", "/")
+
+    def effect(self) -> Effect:
+        """Return what was done to the draft; its arrays stay as they are from here on."""
+        for _, _, element in self._elements:
+            for value in vars(element).values():
+                if isinstance(value, np.ndarray):
+                    value.flags.writeable = False
+        return Effect(self.statement, self._said, self._elements)
+
+    def _tell(self, method: str, *given: Any) -> None:
+        """Call a method of the draft, and remember that."""
+        getattr(self._draft, method)(*given)
+        self._said.append((method, given))
 
     @property
     def label(self) -> str:
@@ -157,27 +231,41 @@ class Entry:
 
     def fault(self, message: str, attribute: str = "") -> None:
         """Add a fault, at the attribute's line and quoting its value where one is named."""
-        self.draft.fault(self._line(attribute), self.label, self._quote(attribute) + message)
+        self.fault_at(self._line(attribute), self._quote(attribute) + message)
+
+    def fault_at(self, line: int, message: str) -> None:
+        """Add a fault that stands at another line than the element's."""
+        self._draft.fault(line, self.label, message)
 
     def warn(self, message: str, attribute: str = "") -> None:
         """Add a warning, placed and quoted like a fault."""
-        self.draft.warn(self._line(attribute), self.label, self._quote(attribute) + message)
+        said = self._quote(attribute) + message
+        self._tell("warn", self._line(attribute), self.label, said)
 
     def note(self, message: str, attribute: str = "") -> None:
         """Add a note that reads the same for every element it applies to."""
         name = self.statement.name + (f" {attribute}" if attribute else "")
-        self.draft.note(self._line(attribute), f"{name}: {message}")
+        self._tell("note", self._line(attribute), f"{name}: {message}")
 
-    def register(self, table: dict[int, Element], element: Element) -> None:
-        """Put the element into its table; an id used twice is a fault."""
+    def register(self, table: str, element: Any, *others: str) -> None:
+        """Put the element into a table of the draft; an id used there or in others is a fault."""
+        id = self.get("id")
+        if id is not None and any(id in getattr(self._draft, other) for other in others):
+            self.fault("id already used; ids are unique per statement", "id")
+        elif self.register_in(getattr(self._draft, table), element):
+            self._elements.append(((table, *others), id, element))
+
+    def register_in(self, table: dict[int, Element], element: Element) -> bool:
+        """Put the element into a table, and return whether that could be; else it is a fault."""
         id = self.get("id")
         if id is None:
-            return
+            return False
         if id in table:
             first = getattr(table[id], "source", Source()).line
             self.fault(f"id already used on line {first}; ids are unique per statement", "id")
-        else:
-            table[id] = element
+            return False
+        table[id] = element
+        return True
 
     def _line(self, attribute: str) -> int:
         found = self._attributes.get(attribute)
@@ -205,7 +293,7 @@ class Entry:
                 known = ", ".join(self.statement.attributes) or "none"
                 help = close or f"; known: {known}"
                 message = f'{attribute.name}="{_short(attribute.value)}": unknown attribute{help}'
-                self.draft.fault(attribute.line, self.label, message)
+                self.fault_at(attribute.line, message)
             elif self.statement.attributes[name].repeats:
                 first = found[name]
                 joined = f"{first.value} | {attribute.value}"
@@ -254,7 +342,7 @@ class Entry:
         for child in self.node.children:
             if child.key not in self.statement.may_hold:
                 close = nearest(child.tag, self.statement.children)
-                self.draft.fault(child.line, self.label, f"unknown element <{child.tag}>{close}")
+                self.fault_at(child.line, f"unknown element <{child.tag}>{close}")
         text = self.statement.text
         if self.node.text and text and text not in self._attributes:
             self._attributes[text] = Attribute(text, self.node.text, self.node.line)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from dataclasses import fields
-from pathlib import Path
 
 from mbsim.expressions.tree import Expression, UserResult
 from mbsim.model import elements as el
@@ -44,8 +43,7 @@ def subroutine(entry: Entry, prefix: str, default: str, libraries: bool = True) 
     named = f"{prefix}_script_name" if entry.given(f"{prefix}_script_name") else "script_name"
     script = entry.get(named, "")
     if script:
-        path = Path(script.replace("\\", "/"))
-        path = path if path.is_absolute() else entry.draft.directory / path
+        path = entry.beside(script)
         script = os.path.realpath(path)
         if not path.is_file():
             entry.fault("no such file (the path is relative to the deck)", named)
@@ -73,8 +71,7 @@ def _library(entry: Entry, prefix: str, libraries: bool) -> str:
     if not libraries:
         entry.fault('a shared library cannot be named here; "NULL" names no file', name)
         return ""
-    path = Path(dll.replace("\\", "/"))
-    path = path if path.is_absolute() else entry.draft.directory / path
+    path = entry.beside(dll)
     # decks of several systems leave the suffix out
     files = [path, *(path.with_name(path.name + suffix) for suffix in (".so", ".dylib", ".dll"))]
     found = next((file for file in files if file.is_file()), None)

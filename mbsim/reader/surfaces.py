@@ -29,7 +29,7 @@ def _build_surface(entry: Entry) -> None:
         label=entry.get("label", ""),
         source=entry.source,
     )
-    entry.register(entry.draft.surfaces, surface)
+    entry.register("surfaces", surface)
 
 
 def _build_point(entry: Entry) -> None:
@@ -45,7 +45,7 @@ def _build_point(entry: Entry) -> None:
         label=entry.get("label", ""),
         source=entry.source,
     )
-    entry.register(entry.draft.points_on_surfaces, point)
+    entry.register("points_on_surfaces", point)
 
 
 _DOCUMENTED = "shared libraries are not built for surfaces; name a script"

@@ -62,12 +62,12 @@ def add_spline(
         label=entry.get("label", ""),
         source=entry.source,
     )
-    entry.register(entry.draft.splines, spline)
+    entry.register("splines", spline)
 
 
 def _from_file(entry: Entry) -> Numbers | None:
     """Return the numbers of a file, separated by commas, semicolons or blanks; # is a comment."""
-    path = entry.draft.directory / entry.get("file", "").replace("\\", "/")
+    path = entry.beside(entry.get("file", ""))
     try:
         text = read_regular(path).decode("utf-8-sig")
     except (OSError, ValueError) as error:
@@ -145,11 +145,12 @@ def add_array(
         )
     elif type == "IC":
         array = el.ArrayOfNumbers(id, numbers, entry.get("label", ""), entry.source)
-        entry.register(draft.arrays, array)
+        entry.register_in(draft.arrays, array)
     else:
         size = len(ids) if type == "U" else size
         variables = tuple(map(int, ids))
-        entry.register(draft.control.arrays, ControlArray(id, type, size, variables, entry.source))
+        array_of = ControlArray(id, type, size, variables, entry.source)
+        entry.register_in(draft.control.arrays, array_of)
 
 
 def _build_array(entry: Entry) -> None:

@@ -20,7 +20,7 @@ def _build_variable(entry: Entry) -> None:
         user=user,
         source=entry.source,
     )
-    entry.register(entry.draft.variables, variable)
+    entry.register("variables", variable)
 
 
 REFERENCE_VARIABLE = Statement(

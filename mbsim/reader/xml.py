@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -239,15 +240,21 @@ def _encoded(text: str) -> bytes:
 def _read_bytes(path: Path) -> bytes:
     """Return the deck's bytes; whatever prevents it becomes one line."""
     try:
-        if path.is_dir():
-            raise ModelError(f"{path}: is a directory, not a deck")
-        if path.exists() and not path.is_file():
-            raise ModelError(f"{path}: is not a regular file")
         return read_regular(path, MAX_BYTES + 1)
     except OSError as error:
-        raise ModelError(f"{path}: cannot be read: {error.strerror or error}") from None
+        raise ModelError(f"{path}: {_why_not(path, error)}") from None
     except ValueError as error:
         raise ModelError(f"{str(path)!r}: is no file name: {error}") from None
+
+
+def _why_not(path: Path, error: OSError) -> str:
+    """Return why a deck cannot be read."""
+    with suppress(OSError):  # of a name that is too long
+        if path.is_dir():
+            return "is a directory, not a deck"
+        if path.exists() and not path.is_file():
+            return "is not a regular file"
+    return f"cannot be read: {error.strerror or error}"
 
 
 def read_sections(deck: Given) -> tuple[str, list[Node]]:

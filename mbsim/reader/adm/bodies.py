@@ -66,7 +66,7 @@ def build_part(entry: Entry) -> None:
         source=entry.source,
     )
     draft_of(entry).parts[id] = frame
-    entry.register(entry.draft.bodies, body)
+    entry.register("bodies", body)
 
 
 def build_point_mass(entry: Entry) -> None:
@@ -84,7 +84,7 @@ def build_point_mass(entry: Entry) -> None:
     )
     draft_of(entry).parts[id] = frame
     draft.points[id] = ("POINT_MASS", entry.source)
-    entry.register(draft.bodies, body)
+    entry.register_in(draft.bodies, body)
 
 
 def _given(entry: Entry, kind: str) -> tuple[bool, bool, bool]:
@@ -116,7 +116,7 @@ def build_marker(entry: Entry) -> None:
         source=entry.source,
         floating=entry.get("FLOATING", False),
     )
-    entry.register(entry.draft.markers, marker)
+    entry.register("markers", marker)
 
 
 def _starts_at_rest(entry: Entry) -> None:
@@ -155,7 +155,7 @@ def build_joint(entry: Entry) -> None:
         pitch_diameter=entry.get("PD"),
         source=entry.source,
     )
-    entry.register(entry.draft.joints, joint)
+    entry.register("joints", joint)
 
 
 def build_primitive(entry: Entry) -> None:
@@ -172,7 +172,7 @@ def build_primitive(entry: Entry) -> None:
         is_primitive=True,
         source=entry.source,
     )
-    entry.register(entry.draft.primitives, joint)
+    entry.register("primitives", joint)
 
 
 def build_constraint(entry: Entry) -> None:
@@ -181,7 +181,7 @@ def build_constraint(entry: Entry) -> None:
         constraint = el.GeneralConstraint(
             entry.get("id", 0), entry.get("FUNCTION"), source=entry.source
         )
-        entry.register(entry.draft.general_constraints, constraint)
+        entry.register("general_constraints", constraint)
 
 
 _DIRECTIONS = {"ROTATION": "R", "TRANSLATION": "T"}
@@ -226,7 +226,7 @@ def build_motion(entry: Entry) -> None:
         ic_vel=entry.get("ICVEL") if val_type == "A" else None,
         source=entry.source,
     )
-    entry.register(entry.draft.motions, motion)
+    entry.register("motions", motion)
 
 
 def build_gravity(entry: Entry) -> None:

@@ -23,7 +23,7 @@ def build_variable(entry: Entry) -> None:
     expr, user = function_or_user(entry, "VARIABLE", "VARSUB")
     if expr is not None:
         variable = el.Variable(entry.get("id", 0), expr, user=user, source=entry.source)
-        entry.register(entry.draft.variables, variable)
+        entry.register("variables", variable)
 
 
 def build_differential(entry: Entry) -> None:
@@ -38,7 +38,7 @@ def build_differential(entry: Entry) -> None:
             user=user,
             source=entry.source,
         )
-        entry.register(entry.draft.differentials, state)
+        entry.register("differentials", state)
 
 
 def build_spline(entry: Entry) -> None:
@@ -122,7 +122,7 @@ def build_request(entry: Entry) -> None:
         user=user,
         source=entry.source,
     )
-    entry.register(entry.draft.requests, request)
+    entry.register("requests", request)
 
 
 def build_integrator(entry: Entry) -> None:

@@ -133,7 +133,7 @@ def build_gear(entry: Entry) -> None:
     except UnfitGearError as error:
         entry.fault(str(error), "JOINTS" if error.is_joint else "CV")
         return
-    entry.register(draft.couplers, made)
+    entry.register_in(draft.couplers, made)
 
 
 GEAR = AdmStatement(

@@ -49,7 +49,7 @@ def build_point_on_curve(entry: Entry) -> None:
         start_marker_id=entry.get("ICM", entry.get("RM")) if given is not None else None,
         source=entry.source,
     )
-    entry.register(entry.draft.points_on_curves, point)
+    entry.register("points_on_curves", point)
 
 
 def build_curve_on_curve(entry: Entry) -> None:
@@ -68,7 +68,7 @@ def build_curve_on_curve(entry: Entry) -> None:
         j_start_marker_id=entry.get("JICM", entry.get("JRM")),
         source=entry.source,
     )
-    entry.register(entry.draft.curves_on_curves, pair)
+    entry.register("curves_on_curves", pair)
 
 
 CURVE = AdmStatement(

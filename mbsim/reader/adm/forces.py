@@ -68,7 +68,7 @@ def build_scalar(entry: Entry) -> None:
         action_only=entry.get("ACTIONONLY", False),
         source=entry.source,
     )
-    entry.register(entry.draft.scalar_forces, force)
+    entry.register("scalar_forces", force)
 
 
 _VECTORS = {"VFORCE": "FORCEONLY", "VTORQUE": "TORQUEONLY", "GFORCE": "FORCEANDTORQUE"}
@@ -106,4 +106,4 @@ def build_vector(entry: Entry) -> None:
         where = f"the {first} on line {other.source.line}"
         entry.fault(f"id already used by {where}; {', '.join(_VECTORS)} share their ids here", "id")
         return
-    entry.register(entry.draft.vector_forces, force)
+    entry.register("vector_forces", force)
