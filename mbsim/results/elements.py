@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from copy import copy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -49,6 +50,16 @@ APPLIED = tuple(FORCES)
 def elements_of(model: Model, statement: str) -> Mapping[int, Any]:
     """Return the elements of a statement by id."""
     return model.table(GROUPS[statement].member)
+
+
+def with_own_tables(model: Model) -> Model:
+    """Return the model with tables of its own: an element put into the other's changes nothing."""
+    found = copy(model)
+    for name, value in vars(model).items():
+        if isinstance(value, dict):
+            own = {key: dict(v) if isinstance(v, dict) else v for key, v in value.items()}
+            vars(found)[name] = own
+    return found
 
 
 def title(model: Model, statement: str, id: int) -> str:

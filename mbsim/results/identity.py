@@ -15,7 +15,9 @@ import os
 import re
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import MISSING, fields, is_dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -28,7 +30,7 @@ from mbsim.expressions import Expression
 from mbsim.integrators.scheme import Method
 from mbsim.model.elements import ASIDE, Source
 from mbsim.model.names import element_name
-from mbsim.results.elements import GROUPS
+from mbsim.results.elements import GROUPS, with_own_tables
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
@@ -200,9 +202,10 @@ def _files(file: Path) -> list[Path]:
         # a look at the folder, and not one for every word of a script
         if home not in beside:
             beside[home] = set(os.listdir(home))
-        words = _words(one, _stamp(one))
-        named = [home / f"{word}{ending}" for word in words if f"{word}{ending}" in beside[home]]
-        named = [file for file in named if file.is_file()]
+        words, end = _words(one, _stamp(one)), len(ending)
+        named = [home / name for name in beside[home]
+                 if name[-end:] == ending and name[:-end] in words]  # fmt: skip
+        named = [file for file in named if file in found or file.is_file()]
         if ending == ".py":
             for word in words & beside[home]:
                 named += (home / word).rglob("*.py")  # of a file there is nothing
@@ -258,19 +261,27 @@ class Identity:
     """
 
     def __init__(self, system: System, settings: Any = None) -> None:
-        self._system = system
-        self._settings = settings
+        self._model, self._settings = system.model, settings
+        self._users: Callable[[], dict[str, Any]] = partial(of_users, system)
+
+    def settled(self) -> Identity:
+        """Return one that says the same whatever becomes of users' files and the model's tables.
+
+        It holds none of the system's arrays.
+        """
+        found, users = copy(self), self._users()
+        found._model, found._users = with_own_tables(self._model), lambda: users
+        return found
 
     @functools.cached_property
     def facts(self) -> dict[str, dict[str, Any]]:
         """Facts by kind, by name; made when they are asked for: only a file needs them."""
-        system, settings = self._system, self._settings
-        file = system.model.file
+        settings, file = self._settings, self._model.file
         return {
             "checkpoint": of_checkpoint(),
-            "model": of_elements(system.model, file),
+            "model": of_elements(self._model, file),
             "settings": {} if settings is None else of_elements(settings, file),
-            "subroutines": of_users(system),
+            "subroutines": self._users(),
         }
 
     @functools.cached_property

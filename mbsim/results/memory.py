@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
 from mbsim.errors import ResultsError
+
+if TYPE_CHECKING:
+    from mbsim.results.identity import Identity
 
 Table = np.ndarray[Any, Any]
 
@@ -27,25 +30,26 @@ class MemoryDataset:
         self.parent = parent
         self.name = name
         self.attrs: dict[str, Any] = {}
-        self._make: Callable[[], Table] | None = values if callable(values) else None
-        self._parts = [] if callable(values) else [np.array(values)]
+        self._parts: list[Any] = []
+        self.append(values)
 
     def __getstate__(self) -> dict[str, Any]:
         """Let a copy in another process have the values."""
-        return {**vars(self), "_parts": [self.values], "_make": None}
+        return {**vars(self), "_parts": [self.values]}
 
-    def append(self, rows: Table) -> None:
-        """Add rows; what is given is another's, who fills it anew."""
-        self._parts.append(np.array(rows))
+    def append(self, rows: Table | Callable[[], Table]) -> None:
+        """Add rows; an array that is given is another's, who fills it anew."""
+        self._parts.append(rows if callable(rows) else np.array(rows))
 
     @property
     def values(self) -> Table:
         """All rows."""
-        if self._make is not None:
-            self._parts, self._make = [self._make()], None
-        if len(self._parts) > 1:
-            self._parts = [np.concatenate(self._parts)]
-        return self._parts[0]
+        parts = self._parts
+        if len(parts) > 1 or callable(parts[0]):
+            made = [np.array(part()) if callable(part) else part for part in parts]
+            self._parts = parts = made if len(made) == 1 else [np.concatenate(made)]
+        found: Table = parts[0]
+        return found
 
     @property
     def file(self) -> MemoryFile:
@@ -82,8 +86,29 @@ class MemoryGroup:
     def __init__(self, parent: MemoryGroup | None, name: str) -> None:
         self.parent = parent
         self.name = name
-        self.attrs: dict[str, Any] = {}
+        self._attrs: dict[str, Any] = {}
+        self._later: Callable[[], Mapping[str, Any]] | None = None
         self._members: dict[str, MemoryGroup | MemoryDataset] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Let a copy in another process have the attributes."""
+        return {**vars(self), "_attrs": self.attrs, "_later": None}
+
+    @property
+    def attrs(self) -> dict[str, Any]:
+        """Attributes, those that are made where somebody looks at them too."""
+        if self._later is not None:
+            later, self._later = self._later, None
+            self._attrs |= later()
+        return self._attrs
+
+    def note(self, facts: Mapping[str, Any]) -> None:
+        """Set attributes, without a look at the others."""
+        self._attrs.update(facts)
+
+    def note_later(self, make: Callable[[], Mapping[str, Any]]) -> None:
+        """Let attributes be those that a function gives, which is called where they are read."""
+        self._later = make
 
     @property
     def file(self) -> MemoryFile:
@@ -187,17 +212,29 @@ class MemoryFile(MemoryGroup):
         """Let go of all that is held."""
         self._open = False
         self._members.clear()
-        self.attrs.clear()
+        self._attrs.clear()
+        self._later = None
 
 
 class MemoryStore:
-    """What `Store` is for a file, for results that stay in memory."""
+    """What `Store` is for a file, for results that stay in memory.
 
-    def __init__(self) -> None:
-        self.file = MemoryFile()
+    `about` has digests of what the run is made of: made where somebody asks.
+    """
+
+    def __init__(self, about: Identity | None = None) -> None:
+        self._about = about
+        self.file = self._new_file()
         self.broken = False
         self.failure: ResultsError | None = None
         self.rows = self.rows_at_once = 0
+
+    def _new_file(self) -> MemoryFile:
+        """Return a file that says what the run is made of."""
+        made, about = MemoryFile(), self._about
+        if about is not None:
+            made.note_later(lambda: about.digests)
+        return made
 
     @contextlib.contextmanager
     def writing(self) -> Iterator[MemoryFile]:
@@ -214,14 +251,14 @@ class MemoryStore:
 
     def update(
         self,
-        rows: Mapping[str, Table] | None = None,
+        rows: Mapping[str, Table] | Mapping[str, Callable[[], Table]] | None = None,
         values: Mapping[str, Any] | None = None,
         constants: Mapping[str, Callable[[], Table]] | None = None,
         attributes: Mapping[str, Mapping[str, Any]] | None = None,
         remove: Iterable[str] = (),
         last: bool = False,
     ) -> None:
-        """Change what is held; arguments as of `Store.update`."""
+        """Change what is held; arguments as of `Store.update`, rows may be what makes them."""
         if self.broken:
             return
         with self.writing() as file:
@@ -240,7 +277,10 @@ class MemoryStore:
                 item = file if name == "/" else file.get(name)
                 if item is None:
                     item = file.create_group(name)
-                item.attrs.update(facts)
+                if isinstance(item, MemoryGroup):
+                    item.note(facts)
+                else:
+                    item.attrs.update(facts)
 
     def shorten(self, length: Callable[[str], int]) -> NoReturn:
         """Nothing is gone on from: there is no checkpoint in memory."""
@@ -249,7 +289,7 @@ class MemoryStore:
     def begin_anew(self, resume: bool) -> None:
         """Drop all that was written."""
         if not self.broken:
-            self.file = MemoryFile()
+            self.file = self._new_file()
 
     def abandon(self) -> None:
         """Let go of all that is held; nothing is kept from here on."""

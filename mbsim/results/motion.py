@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -47,9 +48,14 @@ class Motion:
     p: Array
     q: Array
     v: Array
-    w: Array
+    own_w: Array  # in cg axes
     a: Array
     alpha: Array
+
+    @cached_property
+    def w(self) -> Array:
+        """Angular velocities: found where they are asked for."""
+        return rotate(self.q, self.own_w)
 
     @property
     def rows(self) -> int:
@@ -78,7 +84,7 @@ def motion(body_ids: Sequence[int], y: Array, accel: Array) -> Motion:
         p=bodies[..., 0:3],
         q=q,
         v=bodies[..., AT_V:AT_W],
-        w=rotate(q, bodies[..., AT_W:]),
+        own_w=bodies[..., AT_W:],
         a=rates[..., 0:3],
         alpha=rates[..., 3:6],
     )

@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from mbsim.arrays.codes import PEAK_DEPTH, PEAK_FORCE, PEAK_SLIP
 from mbsim.core import profile
 from mbsim.errors import ResultsError
-from mbsim.results import room
+from mbsim.results import room, signals
 from mbsim.results.audit import Audit, to_attributes
 from mbsim.results.background import Background
 from mbsim.results.blocks import (
@@ -38,15 +37,12 @@ from mbsim.results.memory import MemoryStore
 from mbsim.results.reading import Results, open_results
 from mbsim.results.resume import MADE_OF, WRITTEN, digest, read_checkpoint
 from mbsim.results.signal_filter import SignalFilter
-from mbsim.results.signals import Before, before_rows, length_of, names_of, request_columns, signals
 from mbsim.results.store import Store, Value
 from mbsim.results.watch import Watch
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
     from mbsim.results.contact_posts import ContactPosts
-
-_PEAKS = {"force": PEAK_FORCE, "penetration": PEAK_DEPTH, "slip_speed": PEAK_SLIP}
 
 #: Rows are kept in memory up to about this size [bytes], then written to the part file.
 BUFFER_BYTES = 32 << 20
@@ -130,10 +126,10 @@ class Recorder:
             self._posts = ContactPosts(system, system.posts)
         check_requests(system.model)
         if asked:
-            self._asked.check(names_of(system))
-        digests = {} if self._bare else self._identity.digests
-        self._settings: dict[str, Value] = {**attributes, **digests}
+            self._asked.check(signals.names_of(system))
+        self._settings: dict[str, Value] = {**attributes}
         if directory is not None:
+            self._settings |= self._identity.digests
             prepare_directory(directory, system.model.name)
             self._target = directory / f"{system.model.name}.h5"
         #: Whether the folder shows this run; whether it showed another one before.
@@ -142,7 +138,8 @@ class Recorder:
         if resume:
             self.checkpoint = self._resumed()
         self._given = self._written[0]
-        self._store = MemoryStore() if self._target is None else Store(self._target, resume)
+        about = None if self._bare or directory is not None else self._identity.settled()
+        self._store = MemoryStore(about) if self._target is None else Store(self._target, resume)
         self._store.rows_at_once = self._block
         self._begin_file(resume)
 
@@ -150,9 +147,13 @@ class Recorder:
         """Write what a file says without rows."""
         if resume:
             # what a run that ended outside its loop has recorded since is recorded again
-            self._store.shorten(partial(length_of, self._written))
+            self._store.shorten(partial(signals.length_of, self._written))
         shown = not self._bare
-        new = Before({}, {}, {}) if resume else before_rows(self.system, self._asked, shown)
+        new = (
+            signals.Before({}, {}, {})
+            if resume
+            else signals.before_rows(self.system, self._asked, shown)
+        )
         new.attributes["/"] = {**self._settings, "status": "running"}
         self._store.update(**new._asdict(), remove=["stats", "audit"])
 
@@ -371,12 +372,7 @@ class Recorder:
             If the files cannot be written, or could not be before.
         """
         self._write(last=status == "finished")
-        contacts = self._asked.elements("contacts", self.system.contact_ids)
-        peaks = {
-            f"contacts/peak_{name}": contact_log[contacts, column]
-            for name, column in _PEAKS.items()
-            if contacts
-        }
+        peaks = signals.peaks(self.system, self._asked, contact_log)
         self._store.complete()
         judged = to_attributes(audit) if audit is not None else {}
         if profile.running is not None:
@@ -432,7 +428,9 @@ class Recorder:
         self._background.wait()
         block = self._gathered.block
         self._look(block, self._watched)
-        self._put(block, last)
+        # nobody fills these tables anew; of a run that records little they are more than it keeps
+        later = last and self._target is None and (self._bare or not self.asked)
+        self._put(block, last, later)
         self._given += len(block.time)
         self._gathered.hand_over(block)
         self._watched = 0
@@ -454,14 +452,15 @@ class Recorder:
 
         self._background.begin(write)
 
-    def _put(self, block: Block, last: bool = False) -> None:
-        """Write rows behind those that are in the file."""
+    def _put(self, block: Block, last: bool = False, later: bool = False) -> None:
+        """Write rows behind those that are in the file; in memory they may be made `later`."""
         if self._started and not any(map(len, (block.time, block.incidents, block.events))):
             return
-        rows = dict(self._signals(block))
-        room, size = self._store.room(), sum(table.nbytes for table in rows.values())
+        rows = dict(self._signals(block, later))
+        room = self._store.room()
+        size = 0 if room is None else sum(table.nbytes for table in rows.values())
         # with the first rows, so that a run that dies has them too
-        columns = {} if self._started else request_columns(self.system)
+        columns = {} if self._started else signals.request_columns(self.system)
         if room is not None and size > room:
             # and of the checkpoint, with which it goes on
             room = max(0, room - sum(table.nbytes for table in self._last.values()))
@@ -492,6 +491,7 @@ class Recorder:
         self._show()
         self._store.stop(said)
 
-    def _signals(self, block: Block) -> Iterator[tuple[str, Table]]:
-        """Yield the rows of every dataset."""
-        return signals(self.system, block, self._asked, self._written[1], not self._started)
+    def _signals(self, block: Block, later: bool = False) -> Iterator[tuple[str, Any]]:
+        """Yield the rows of every dataset; `later`: what makes them."""
+        given = self._asked, self._written[1], not self._started
+        return (signals.signals_later if later else signals.signals)(self.system, block, *given)

@@ -173,12 +173,15 @@ def request_table(
     """
     if request.type == "EXPRESSION":
         return expressions(request, forces.system.values, value)
-    if request.type == "MARKER_FORCE":
-        wrench = forces.on_marker(request)
-    elif request.type == "ELEMENTAL_FORCE":
-        wrench = forces.of_element(request)
-    else:
+    if request.type in RELATIVE:
         return evaluate(request, markers, forces.bodies)
+    return force_table(request, markers, forces)
+
+
+def force_table(request: Request, markers: Mapping[int, MarkerPlace], forces: Forces) -> Array:
+    """Return F1..F8 (n, 8) of a MARKER_FORCE or ELEMENTAL_FORCE, as `request_table`."""
+    of_marker = request.type == "MARKER_FORCE"
+    wrench = forces.on_marker(request) if of_marker else forces.of_element(request)
     return resolved(wrench, marker_motion(request.ref_marker_id, markers, forces.bodies).R)
 
 
@@ -221,7 +224,7 @@ def places(request: Request, values: Sequence[tuple[int, int]]) -> dict[int, int
 
 
 #: F2..F4 and F6..F8 (n, 3) of I relative to J, global axes; None for the angles of a rotation.
-_RELATIVE: dict[str, Callable[[MarkerMotion, MarkerMotion], tuple[Array, Array | None]]] = {
+RELATIVE: dict[str, Callable[[MarkerMotion, MarkerMotion], tuple[Array, Array | None]]] = {
     "MARKER_DISPLACEMENT": lambda i, j: (i.p - j.p, None),
     "MARKER_VELOCITY": lambda i, j: (i.v - j.v, i.w - j.w),
     "MARKER_ACCELERATION": lambda i, j: (i.a - j.a, i.alpha - j.alpha),
@@ -234,7 +237,7 @@ def evaluate(request: Request, markers: Mapping[int, MarkerPlace], bodies: Motio
     Parameters
     ----------
     request : Request
-        Of a type in `_RELATIVE`.
+        Of a type in `RELATIVE`.
     markers : mapping of int to MarkerPlace
         All markers of the model.
     bodies : Motion
@@ -258,7 +261,7 @@ def evaluate(request: Request, markers: Mapping[int, MarkerPlace], bodies: Motio
         marker_motion(id, markers, bodies)
         for id in (request.i_marker_id, request.j_marker_id, request.ref_marker_id)
     )
-    linear, angular = _RELATIVE[request.type](i, j)
+    linear, angular = RELATIVE[request.type](i, j)
     made = np.zeros((bodies.rows, 8))
     to_reference = reference.R.swapaxes(-1, -2)
     made[:, 0] = np.linalg.norm(linear, axis=-1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -48,16 +49,16 @@ class SignalFilter:
 
     def stacked(
         self, group: str, ids: Sequence[int], tables: Mapping[str, Callable[[], Table]]
-    ) -> Iterator[tuple[str, Table]]:
-        """Yield datasets that hold a signal of all elements of a group, (rows, elements, ...).
+    ) -> Iterator[tuple[str, Callable[[], Table]]]:
+        """Yield what makes datasets of all elements of a group, (rows, elements, ...).
 
         A signal asked of one element is recorded of all that the group's dataset ``id`` has.
         """
         columns = self.elements(group, ids)
         for signal, table in tables.items():
             if any(self(f"{group}/{ids[k]}/{signal}") for k in columns):
-                rows = table()
-                yield f"{group}/{signal}", rows if len(columns) == len(ids) else rows[:, columns]
+                whole = len(columns) == len(ids)
+                yield f"{group}/{signal}", table if whole else partial(_chosen, table, columns)
 
     def check(self, names: Iterable[str]) -> None:
         """Raise `ModelError` where a pattern stands for nothing that can be recorded."""
@@ -72,6 +73,12 @@ class SignalFilter:
             faults.append(f"--signals {pattern}: this model has no such signal{hint}")
         if faults:
             raise ModelError("\n".join(faults))
+
+
+def _chosen(table: Callable[[], Table], columns: list[int]) -> Table:
+    """Return some elements' columns of a table."""
+    chosen: Table = table()[:, columns]
+    return chosen
 
 
 def _there(known: Sequence[str]) -> str:

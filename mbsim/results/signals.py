@@ -17,17 +17,27 @@ from mbsim.arrays.codes import (
     CONTACT_SLIP,
     CONTACT_TORQUE,
     INC_POINT,
+    PEAK_DEPTH,
+    PEAK_FORCE,
+    PEAK_SLIP,
     POINT_AREA,
     POINT_CONTACT,
     POINT_FORCE,
     POINT_SLIP,
 )
 from mbsim.results.blocks import Block, Table, events_table, nothing
-from mbsim.results.elements import GROUPS, acting, facts
+from mbsim.results.elements import GROUPS, acting, facts, with_own_tables
 from mbsim.results.forces import Forces
 from mbsim.results.graphics import about_graphics, graphics_later
-from mbsim.results.motion import motion
-from mbsim.results.requests import columns_of, measures_of, request_table
+from mbsim.results.motion import Motion, motion
+from mbsim.results.requests import (
+    RELATIVE,
+    columns_of,
+    evaluate,
+    expressions,
+    force_table,
+    measures_of,
+)
 from mbsim.results.signal_filter import SignalFilter
 from mbsim.results.watch import energies
 
@@ -35,6 +45,9 @@ if TYPE_CHECKING:
     from mbsim.compile_model.build import System
 
 
+_PEAKS = {"force": PEAK_FORCE, "penetration": PEAK_DEPTH, "slip_speed": PEAK_SLIP}
+#: What makes the rows of a dataset.
+Make = Callable[[], Table]
 #: The group of points of contact, see `_points`.
 POINTS = "contact_points"
 
@@ -104,7 +117,7 @@ def before_rows(system: System, asked: SignalFilter, pictures: bool = True) -> B
     about = about_graphics(system.model, system.placement)
     return Before(
         facts_of(system, asked),
-        graphics_later(system.model, system.placement),
+        graphics_later(with_own_tables(system.model), system.placement),
         {**without_rows(system), "graphics": dict(about)},
     )
 
@@ -123,7 +136,7 @@ def names_of(system: System) -> list[str]:
     stacked = groups(system)
     return [
         name
-        for stored, _ in signals(system, nothing(system), SignalFilter())
+        for stored, _ in signals_later(system, nothing(system), SignalFilter())
         if not stored.startswith(f"{POINTS}/")
         for group, _, signal in [stored.partition("/")]
         for name in (
@@ -152,7 +165,15 @@ def signals(
     system: System, block: Block, asked: SignalFilter, incidents: int = 0, first: bool = True
 ) -> Iterator[tuple[str, Table]]:
     """Yield the rows of every dataset that was asked for."""
-    yield "time", block.time
+    found = signals_later(system, block, asked, incidents, first)
+    return ((name, make()) for name, make in found)
+
+
+def signals_later(
+    system: System, block: Block, asked: SignalFilter, incidents: int = 0, first: bool = True
+) -> Iterator[tuple[str, Make]]:
+    """Yield what makes the rows of every dataset that was asked for; it keeps of all the block."""
+    yield "time", lambda: block.time
     bodies = motion(system.body_ids, block.y, block.accel)
     yield from asked.stacked(
         "bodies",
@@ -168,45 +189,76 @@ def signals(
     yield from _contacts(system, block, asked)
     yield from _elements(system, block, asked)
     states = list(system.model.differentials)
-    places = np.asarray(system.scene.states.offset[: len(states)], dtype=np.int64)
+    places = np.array(system.scene.states.offset[: len(states)], dtype=np.int64)
     yield from asked.stacked("diffs", states, {"value": lambda: block.y[:, places]})
     for name, column in system.unknowns():
         if asked(name):
-            yield name, block.value[:, column]
-    forces = Forces(system, bodies, block.joint, block.applied, block.contact)
-    for request in system.model.requests.values():
-        markers = system.placement.markers
-        yield f"requests/{request.id}", request_table(request, markers, forces, block.value)
+            yield name, partial(_column, block.value, column)
+    yield from _requests(system, block, bodies)
     for k, name in enumerate(energies(system)):
         if asked(f"energy/{name}"):
-            yield f"energy/{name}", block.energy[:, k]
+            yield f"energy/{name}", partial(_column, block.energy, k)
     if asked("state/y"):
-        yield "state/y", block.y
-        ends = incidents + np.cumsum(block.incident_count, dtype=np.int64)
-        # row k has incidents[offsets[k] : offsets[k + 1]]
-        yield "state/incident_offsets", np.append(0, ends) if first else ends
-        yield "state/incidents", block.incidents
+        yield "state/y", lambda: block.y
+        yield "state/incident_offsets", partial(_offsets, block.incident_count, incidents, first)
+        yield "state/incidents", lambda: block.incidents
     if len(system.scene.rows.points):
         yield from _points(system, block, incidents, first)
-    yield "events", events_table(block.events)
+    yield "events", partial(events_table, block.events)
+
+
+def _column(table: Table, column: int) -> Table:
+    found: Table = table[:, column]
+    return found
+
+
+def _offsets(counts: Table, before: int, first: bool) -> Table:
+    """Return where the incidents of rows end; row k has [offsets[k] : offsets[k + 1]]."""
+    ends = before + np.cumsum(counts, dtype=np.int64)
+    return np.append(0, ends) if first else ends
+
+
+def _requests(system: System, block: Block, bodies: Motion) -> Iterator[tuple[str, Make]]:
+    """Yield what makes the rows of requests; forces are found at once, for they need the system."""
+    requests = system.model.requests.values()
+    if not requests:
+        return
+    forces = Forces(system, bodies, block.joint, block.applied, block.contact)
+    markers, values, numbers = system.placement.markers, system.values, block.value
+    for request in requests:
+        make: Make
+        if request.type == "EXPRESSION":
+            make = partial(expressions, request, values, numbers)
+        elif request.type in RELATIVE:
+            make = partial(evaluate, request, markers, bodies)
+        else:
+            make = partial(np.asarray, force_table(request, markers, forces))
+        yield f"requests/{request.id}", make
+
+
+def peaks(system: System, asked: SignalFilter, log: Table) -> dict[str, Table]:
+    """Return the largest force, depth and slip of contacts, of `Log.contacts`, by dataset."""
+    kept = asked.elements("contacts", system.contact_ids)
+    if not kept:
+        return {}
+    return {f"contacts/peak_{name}": log[kept, column] for name, column in _PEAKS.items()}
 
 
 def _points(
     system: System, block: Block, incidents: int, first: bool
-) -> Iterator[tuple[str, Table]]:
+) -> Iterator[tuple[str, Make]]:
     """Yield where bodies touch and the forces there; row k has offsets[k] to offsets[k + 1]."""
-    ends = incidents + np.cumsum(block.incident_count, dtype=np.int64)
-    yield f"{POINTS}/offsets", np.append(0, ends) if first else ends
+    yield f"{POINTS}/offsets", partial(_offsets, block.incident_count, incidents, first)
     points, ids = block.points, np.array([*system.contact_ids, 0], dtype=np.int64)
-    yield f"{POINTS}/contact", ids[points[:, POINT_CONTACT].astype(np.int64)]
-    yield f"{POINTS}/position", block.incidents[:, INC_POINT : INC_POINT + 3]
-    yield f"{POINTS}/force", points[:, POINT_FORCE : POINT_FORCE + 3]
-    yield f"{POINTS}/slip_speed", points[:, POINT_SLIP]
-    yield f"{POINTS}/area", points[:, POINT_AREA]
+    yield f"{POINTS}/contact", lambda: ids[points[:, POINT_CONTACT].astype(np.int64)]
+    yield f"{POINTS}/position", lambda: block.incidents[:, INC_POINT : INC_POINT + 3]
+    yield f"{POINTS}/force", lambda: points[:, POINT_FORCE : POINT_FORCE + 3]
+    yield f"{POINTS}/slip_speed", partial(_column, points, POINT_SLIP)
+    yield f"{POINTS}/area", partial(_column, points, POINT_AREA)
 
 
-def _contacts(system: System, block: Block, asked: SignalFilter) -> Iterator[tuple[str, Table]]:
-    """Yield the rows of contacts."""
+def _contacts(system: System, block: Block, asked: SignalFilter) -> Iterator[tuple[str, Make]]:
+    """Yield what makes the rows of contacts."""
     ids = system.contact_ids
     rows = block.contact.reshape(len(block.time), len(ids), CONTACT_COLUMNS)
     yield from asked.stacked(
@@ -223,9 +275,11 @@ def _contacts(system: System, block: Block, asked: SignalFilter) -> Iterator[tup
     )
 
 
-def _elements(system: System, block: Block, asked: SignalFilter) -> Iterator[tuple[str, Table]]:
-    """Yield the rows of everything between markers, element by element in its group's order."""
+def _elements(system: System, block: Block, asked: SignalFilter) -> Iterator[tuple[str, Make]]:
+    """Yield what makes the rows of all between markers, by element in its group's order."""
     elements = acting(system)
+    if not elements:
+        return
     wrenches = block.wrenches.reshape(len(block.time), len(elements), 6)
     columns: dict[str, dict[int, int]] = {}
     for k, (statement, id) in enumerate(elements):

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import pickle
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import mbsim
 from helpers.fake_run import SETTINGS, add_rows, fake_system
+from helpers.folders import MODELS
 from mbsim.errors import ResultsError
 from mbsim.results.memory import MemoryStore
 from mbsim.results.reading import Results
@@ -75,3 +79,43 @@ def test_pickled_results_are_whole_and_closed_ones_say_so(tmp_path: Path) -> Non
         held["time"]
     assert len(again["time"]) == 12
     assert isinstance(again, Results)
+
+
+def test_what_a_run_was_made_of_is_what_it_was_made_of(tmp_path: Path) -> None:
+    """Digests and tables are made where they are looked at, and files and models may change."""
+    script = tmp_path / "law.py"
+    deck = tmp_path / "ball.xml"
+    text = (MODELS / "bowling_ball.xml").read_text()
+    named = text.split('script_name="')[1].split('"')[0]
+    shutil.copy(MODELS / named, script)
+    deck.write_text(text.replace(named, "law.py"))
+    kinds = ("system_sha256", "subroutines_sha256", "settings_sha256", "checkpoint_sha256")
+    model = mbsim.read_model(deck)
+    with mbsim.simulate(model, end_time=0.05) as first:
+        expected = {kind: first.attributes[kind] for kind in kinds}
+        markers = first.tables("graphics")
+    with mbsim.simulate(model, end_time=0.05) as later:
+        model.bodies[2] = replace(model.bodies[2], mass=50.0)
+        del model.markers[20]
+        script.write_text(script.read_text() + "\n# another\n")
+        assert {kind: later.attributes[kind] for kind in kinds} == expected
+        assert later.tables("graphics").keys() == markers.keys()
+        np.testing.assert_array_equal(later.tables("graphics")["shapes"], markers["shapes"])
+
+
+def test_signals_that_are_made_later_are_those_of_a_file(tmp_path: Path) -> None:
+    model = mbsim.read_model(MODELS / "bowling_ball.xml")
+    with (
+        mbsim.simulate(model, end_time=0.1) as held,
+        mbsim.simulate(model, end_time=0.2),
+        mbsim.simulate(model, end_time=0.1, output=tmp_path) as stored,
+    ):
+        assert held.keys() == stored.keys()
+        for name in stored:
+            np.testing.assert_array_equal(held[name], stored[name], strict=True)
+        taken = held["bodies/2/position"]
+        taken[:] = 0.0  # a copy, and no part of the state from which others are made
+        np.testing.assert_array_equal(held["state/y"], stored["state/y"])
+        copy = pickle.loads(pickle.dumps(held))
+        np.testing.assert_array_equal(copy["contacts/301/force"], stored["contacts/301/force"])
+        assert copy.attributes == held.attributes
