@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mbsim.arrays.model import Equations
+from mbsim.core.prototypes import copies
 
 
 @dataclass
@@ -56,6 +57,9 @@ class Sums:
 
     def arrays(self) -> Equations:
         """Return the equations as arrays, all in use."""
+        return self._arrays() if self.program else _no_equations()
+
+    def _arrays(self) -> Equations:
         n = len(self.program)
 
         def ints(values: Iterable[int]) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
@@ -82,3 +86,8 @@ class Sums:
             angle=ints(t[6] for t in self.terms),
             active=np.append(np.arange(n), n),
         )
+
+
+@copies
+def _no_equations() -> Equations:
+    return Sums()._arrays()

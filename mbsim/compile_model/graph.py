@@ -23,6 +23,7 @@ from mbsim.compile_model.elimination import (
     pattern,
     products,
 )
+from mbsim.core.prototypes import copies
 
 #: With fewer equations nothing is to be gained.
 FEWEST = 20
@@ -184,16 +185,52 @@ def _orders(nodes: Sequence[Node], which: Mapping[int, int]) -> tuple[Order, Ord
     return None if joints is None or links is None else (joints, links)
 
 
+@copies
+def _no_graph(bodies: int, terms: int) -> ConstraintGraph:
+    """Return the graph of a tree of so many bodies, whose equations are not eliminated by it."""
+    none, blocks, rows = ints([]), np.zeros((0, 6, 6)), np.zeros((0, 6))
+    return ConstraintGraph(
+        tree=none,
+        equation=none,
+        several=none,
+        connection=none,
+        first=ints([0]),
+        body=none,
+        node=none,
+        node_of=none,
+        reaction=ints([], -1, 2),
+        term=np.full((terms, 2), -1, dtype=np.int64),
+        bodies=none,
+        body_of=np.full(bodies, -1, dtype=np.int64),
+        place=none,
+        joints=pattern(Order(), ()),
+        links=pattern(Order(), ()),
+        in_use=ints([0]),
+        row=none,
+        bears=none,
+        rows=none,
+        J=blocks,
+        Y=blocks,
+        H=blocks,
+        R=blocks,
+        u=rows,
+        shift=rows,
+        cost=np.array([1.0, 0.0]),
+    )
+
+
 def make_graph(
     tree: Tree, equations: Equations, connections: Connections, markers: Markers
 ) -> ConstraintGraph:
     """Return the graph of constraints, an empty one where there is little to gain."""
     of = _Mechanism(tree, equations, connections, markers)
-    nodes, bodies = of.nodes() if of.gains() else ([], [])
+    if not of.gains():
+        return _no_graph(len(tree.body), len(equations.kind))
+    nodes, bodies = of.nodes()
     which = {k: b for b, k in enumerate(bodies)}
     orders = _orders(nodes, which) if all(of.fits(node) for node in nodes) else None
     if orders is None:
-        nodes, bodies, which, orders = [], [], {}, (Order(), Order())
+        return _no_graph(len(tree.body), len(equations.kind))
     joints, links = orders
     at = Incidences([nodes[k] for k in joints.order], which)
     n, many, place = len(nodes), len(at.body), links.place

@@ -26,6 +26,7 @@ from mbsim.compile_model.param_surfaces import (
     nearest_corner,
     patches_of,
 )
+from mbsim.core.prototypes import copies
 from mbsim.errors import DeckError, Fault
 from mbsim.model.curves import CurveOnCurve, PointOnCurve, PointOnSurface
 from mbsim.model.elements import Model
@@ -58,6 +59,8 @@ def add_higher_pairs(
     functions: Mapping[int, Function] | None,
 ) -> tuple[Curves, Surfaces, Array]:
     """Add the equations of higher pairs to `sums`; return curves, surfaces and where they begin."""
+    if not (model.points_on_curves or model.curves_on_curves or model.points_on_surfaces):
+        return _no_pairs()
     table, surfaces = CurveTable(), SurfaceTable()
 
     def hold(statement: str, id: int, row: int, kind: int) -> None:
@@ -80,6 +83,12 @@ def add_higher_pairs(
         hold("PTSF", held.id, row, codes.POINT_ON_SURFACE)
     made, along = table.arrays()
     return made, surfaces.arrays(), np.concatenate([along, np.array(surfaces.along)])
+
+
+@copies
+def _no_pairs() -> tuple[Curves, Surfaces, Array]:
+    made, along = CurveTable().arrays()
+    return made, SurfaceTable().arrays(), along
 
 
 def _global(markers: MarkerTable, marker_id: int | None, place: tuple[float, ...]) -> Array:

@@ -38,6 +38,7 @@ from mbsim.compile_model.instructions import (
 from mbsim.compile_model.markers import MarkerTable
 from mbsim.compile_model.program_quick import quicken, stack_depth
 from mbsim.compile_model.splines import SplineTable
+from mbsim.core.prototypes import copies
 from mbsim.errors import DeckError, Fault
 from mbsim.expressions import elementary
 from mbsim.expressions.elementary import CODES, NUMBER, TIME
@@ -205,6 +206,8 @@ class ProgramTable:
         rows.update({element: (0, k) for k, element in enumerate(connections)})
         rows.update({("CONTACT", id): (2, k) for k, id in enumerate(contacts)})
         self.element_rows = rows
+        if not (self.programs or self.inputs or self.curves.made):
+            return _no_programs()
         numbers = NumberTable([each.start for each in self.inputs])
         start, code = _table(self.programs, rows, numbers)
         shortened = [quicken(program) for program in self.programs]
@@ -222,6 +225,13 @@ class ProgramTable:
             np.zeros(deepest + 1),
             *self.curves.arrays(),
         )
+
+
+@copies
+def _no_programs() -> Programs:
+    start, code = _table([], {}, NumberTable([]))
+    none, curves = np.zeros(0), SplineTable().arrays()
+    return Programs(start, code, none, np.zeros((0, 3)), start, code, none, np.zeros(1), *curves)
 
 
 class NumberTable:
