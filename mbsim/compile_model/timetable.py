@@ -338,17 +338,4 @@ def _asks_time(system: System) -> bool:
     """Return whether a user's function may look at the time."""
     if any(name[0] != STATEMENT and user.acts for name, user in system.subroutines.items()):
         return True
-    if not system.user_laws:
-        return False
-    from importlib.util import decode_source
-
-    from mbsim.core.stored import read_regular
-    from mbsim.plugins.source.diagnose import reads_parameter
-
-    for _, user in system.user_laws:
-        source = user.source
-        if user.function is None or source.suffix != ".py":
-            return True
-        if reads_parameter(decode_source(read_regular(source)), user.name, 1):
-            return True
-    return False
+    return any(user.reads_time for _, user in system.user_laws)

@@ -73,9 +73,10 @@ def load_friction(
     states = _states(script, contact)
     function = user_function(script, name, element, CFFSUB + ", state" * (states > 0))
     par = np.array(contact.cff.par, dtype=np.float64)
-    uses_x = True  # a .pyc has no text to look at
+    uses_x = reads_time = True  # a .pyc has no text to look at
     if script.text is not None:
         uses_x = reads_parameter(script.text, name, 6)
+        reads_time = reads_parameter(script.text, name, 1)
         for warning in lint(script.text, name, states > 0):
             say(f"{element}: {script.path}: warning: {warning}")
 
@@ -88,6 +89,7 @@ def load_friction(
             compiled=not reason,
             reason=reason,
             uses_x=uses_x,
+            reads_time=reads_time,
             source=script.path,
             name=name,
             element=contact.id,

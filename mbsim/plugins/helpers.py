@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import builtins
+import functools
 import math
 import sys
+import types
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -215,7 +217,8 @@ def print_to_stderr(*args: Any, file: Any = None, **options: Any) -> None:
     builtins.print(*args, file=sys.stderr if file is None else file, **options)
 
 
-def namespace() -> dict[str, Any]:
+@functools.cache
+def namespace() -> Mapping[str, Any]:
     """Return the names that a script starts with: all of `math`, and the helpers."""
     names = {name: value for name, value in vars(math).items() if not name.startswith("_")}
     for helper in (
@@ -224,4 +227,4 @@ def namespace() -> dict[str, Any]:
     ):  # fmt: skip
         names[helper.__name__] = helper
     names["print"] = print_to_stderr
-    return names
+    return types.MappingProxyType(names)

@@ -69,7 +69,9 @@ def load_normal(
         function = octave.add(source, CNFSUB, len(made.par), element)
         made = replace(made, function=function, language="Octave", compiled=False, keep=octave)
     else:
-        made = replace(made, function=user_function(source, name, element, CNFSUB))
+        reads_time = source.text is None or reads_parameter(source.text, name, 1)
+        function = user_function(source, name, element, CNFSUB)
+        made = replace(made, function=function, reads_time=reads_time)
         address, reason = (0, "--interpret-plugins") if interpret else _compiled(made, source)
         if not reason:
             return replace(made, address=address)

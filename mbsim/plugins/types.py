@@ -56,6 +56,8 @@ class UserFriction(_Called):
         Why it stays interpreted, empty if compiled.
     uses_x : bool
         Whether its text reads the deformation `x`, or might: the host then integrates X.
+    reads_time : bool
+        Whether its text reads the time, or might.
     reads_x : bool
         Whether an error of X counts; not where a function without text is seen not to read it.
     source : Path
@@ -94,6 +96,7 @@ class UserFriction(_Called):
     asked: tuple[str, ...] = ()
     reads_x: bool = True
     states: int = 0
+    reads_time: bool = True
 
     def call(
         self,
@@ -139,7 +142,7 @@ class UserNormal(_Called):
         What the law is given beside depth and rate.
     hidden : tuple of float
         What the C function reads of its parameters before `par`.
-    language, compiled, reason, source, name, element, function, looks, asked
+    language, compiled, reason, source, name, element, function, looks, asked, reads_time
         As of `UserFriction`.
     """
 
@@ -157,6 +160,7 @@ class UserNormal(_Called):
     keep: object = field(default=None, repr=False)
     looks: bool = False
     asked: tuple[str, ...] = ()
+    reads_time: bool = True
 
     def call(self, depth: float, rate: float) -> float:
         """Return the force of the interpreted function at its place; exceptions come through."""

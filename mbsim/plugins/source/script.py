@@ -45,7 +45,7 @@ class Script:
 
     def defines(self, name: str) -> bool:
         """Return whether the script has bound a name beside those it was given."""
-        return name in _own(self)
+        return name in self.values and _is_own(name, self.values[name])
 
     def listed(self) -> str:
         """Return the functions that the script defines, for a message."""
@@ -58,12 +58,13 @@ Scripts = dict[Path, Script]
 
 def _own(script: Script) -> dict[str, Any]:
     """Return what a script has bound beside the names it was given."""
+    return {name: value for name, value in script.values.items() if _is_own(name, value)}
+
+
+def _is_own(name: str, value: Any) -> bool:
+    """Return whether a script has bound a name to that, for it was not given so."""
     given = namespace()
-    return {
-        name: value
-        for name, value in script.values.items()
-        if not name.startswith("__") and (name not in given or value is not given[name])
-    }
+    return not name.startswith("__") and (name not in given or value is not given[name])
 
 
 def require(script: Script, name: str, element: str, attribute: str) -> None:
@@ -132,15 +133,22 @@ def load_script(path: Path, element: str, scripts: Scripts) -> Script:
         if path.suffix.lower() == ".pyc":
             code = _bytecode(data, path, element)
         else:
-            text = importlib.util.decode_source(data)
+            text, lines = _decoded(data)
             code = _compiled(text, str(path))
     except (SyntaxError, ValueError, UnicodeDecodeError) as error:
         raise ModelError(f"{element}: {diagnose(data, str(path), error)}") from None
     if text is not None:
         # tracebacks show the lines that run, even if the file is edited meanwhile
-        linecache.cache[str(path)] = (len(data), None, text.splitlines(True), str(path))
+        linecache.cache[str(path)] = (len(data), None, lines, str(path))
     scripts[path] = Script(path, text, _run(code, path, element))
     return scripts[path]
+
+
+@functools.lru_cache(maxsize=256)
+def _decoded(data: bytes) -> tuple[str, list[str]]:
+    """Return the text of a script, whole and in lines, which nobody changes."""
+    text = importlib.util.decode_source(data)
+    return text, text.splitlines(True)
 
 
 @functools.lru_cache(maxsize=256)
