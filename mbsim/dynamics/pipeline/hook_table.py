@@ -14,11 +14,9 @@ and the run where a shorter step does not help.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Container
 from importlib import import_module
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from mbsim.arrays.codes import MULTI_POINT, RESIDUAL, VECTOR_FORCE, WRENCH
 from mbsim.arrays.hooks import Hook
@@ -32,6 +30,7 @@ from mbsim.geometry.catalog import REGION_ROWS
 _AT = INT(INT, FLOAT, POINTER)  # context, t, y
 _FORCES = INT(INT, FLOAT, POINTER, POINTER)  # context, t, y, dy
 _KEEPS = INT(INT, INT, FLOAT, POINTER)  # context, request, t, y
+_WRENCHES = frozenset((VECTOR_FORCE, WRENCH, RESIDUAL, MULTI_POINT))
 
 
 class Method(NamedTuple):
@@ -128,7 +127,7 @@ def _applied(scene: Scene) -> Callable[..., Any]:
 
 
 def _has_wrenches(scene: Scene, method: Method) -> bool:
-    return bool(np.isin(scene.applied.form, (VECTOR_FORCE, WRENCH, RESIDUAL, MULTI_POINT)).any())
+    return not _WRENCHES.isdisjoint(scene.applied.form.tolist())
 
 
 def _wrench(scene: Scene) -> Callable[..., Any]:
@@ -481,17 +480,21 @@ TABLE = (
 )
 
 
-def fill(scene: Scene, method: Method | None = None, only: Iterable[Hook] | None = None) -> None:
+def fill(scene: Scene, method: Method | None = None, only: Container[Hook] | None = None) -> None:
     """Put the hooks that a scene and a method need into `World.hooks`, those of `only` if given."""
-    wanted = set(Hook) if only is None else set(only)
+    method = method or Method()
     for row in TABLE:
-        if row.hook in wanted and row.when(scene, method or Method()):
-            put(scene, row.hook)
+        if (only is None or row.hook in only) and row.when(scene, method):
+            _put(scene, row)
 
 
 def put(scene: Scene, *hooks: Hook) -> None:
     """Put hooks into `World.hooks` that are not there yet."""
-    for row in TABLE:
-        # what was only counted, to say how much is to be compiled, is not there either
-        if row.hook in hooks and scene.world.hooks[row.hook] in (0, jit.NOT_YET):
-            scene.world.hooks[row.hook] = jit.address(row.entry(scene), row.signature)
+    for row in (row for row in TABLE if row.hook in hooks):
+        _put(scene, row)
+
+
+def _put(scene: Scene, row: Row) -> None:
+    # what was only counted, to say how much is to be compiled, is not there either
+    if scene.world.hooks[row.hook] in (0, jit.NOT_YET):
+        scene.world.hooks[row.hook] = jit.address(row.entry(scene), row.signature)
