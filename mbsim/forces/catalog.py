@@ -285,6 +285,7 @@ FORCES: Registry[ForceKind] = Registry(
 
 
 @functools.cache
+@functools.cache
 def table_of(name: str) -> str:
     """Return the field of `Model` that has elements of a kind, nothing where several share one."""
     return FORCES[name].table if name in FORCES else name

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from typing import Any
 
 from mbsim.errors import Fault
@@ -50,31 +51,48 @@ _MARKERS = (
     "j_start_marker_id",
 )
 
+#: Fields of `Model` with elements of this module, before forces and behind them.
+_CONSTRAINTS = {
+    "Constraint_Joint": "joints",
+    "Constraint_Jprim": "primitives",
+    "Constraint_Coupler": "couplers",
+    "Constraint_General": "general_constraints",
+    "Constraint_PTCV": "points_on_curves",
+    "Constraint_CVCV": "curves_on_curves",
+    "Constraint_PTSF": "points_on_surfaces",
+    "Motion_Joint": "motions",
+}
+_OTHERS = {
+    "Reference_Variable": "variables",
+    "Control_Diff": "differentials",
+    "Reference_Spline": "splines",
+    "Reference_ParamCurve": "curves",
+    "Reference_ParamSurface": "surfaces",
+    "Reference_Array": "arrays",
+    "Sensor_Event": "sensors",
+    "Sensor_Evaluate": "evaluations",
+}
+
 Wanted = tuple[Source, str, str, int | None, str]
 Exists = Callable[[str, int], bool]
 
 
 def tables(model: Model) -> dict[str, Mapping[int, Any]]:
     """Return the elements of this module by statement and id."""
-    return {
-        "Constraint_Joint": model.joints,
-        "Constraint_Jprim": model.primitives,
-        "Constraint_Coupler": model.couplers,
-        "Constraint_General": model.general_constraints,
-        "Constraint_PTCV": model.points_on_curves,
-        "Constraint_CVCV": model.curves_on_curves,
-        "Constraint_PTSF": model.points_on_surfaces,
-        "Motion_Joint": model.motions,
-        **{FORCES[name].statement: model.table(name) for name in FORCES},
-        "Reference_Variable": model.variables,
-        "Control_Diff": model.differentials,
-        "Reference_Spline": model.splines,
-        "Reference_ParamCurve": model.curves,
-        "Reference_ParamSurface": model.surfaces,
-        "Reference_Array": model.arrays,
-        "Sensor_Event": model.sensors,
-        "Sensor_Evaluate": model.evaluations,
-    }
+    return {statement: model.table(name) for statement, name in _names()}
+
+
+def filled(model: Model) -> Iterator[tuple[str, Mapping[int, Any]]]:
+    """Yield the tables that have elements: most of them have none."""
+    for statement, name in _names():
+        if table := model.table(name):
+            yield statement, table
+
+
+@cache
+def _names() -> tuple[tuple[str, str], ...]:
+    forces = ((FORCES[name].statement, name) for name in FORCES)
+    return (*_CONSTRAINTS.items(), *forces, *_OTHERS.items())
 
 
 def name_of(statement: str, element: Any) -> str:
@@ -84,7 +102,7 @@ def name_of(statement: str, element: Any) -> str:
 
 def wanted(model: Model) -> Iterator[Wanted]:
     """Yield every reference: where, from which element and attribute, to which id and statement."""
-    for statement, table in tables(model).items():
+    for statement, table in filled(model):
         for element in table.values():
             name = name_of(statement, element)
             # a motion of a joint has the joint's markers
@@ -130,7 +148,7 @@ def _other_statement(model: Model, id: int, statement: str) -> str:
 
 def expressions(model: Model) -> Iterator[tuple[Source, str, str, Expression]]:
     """Yield every expression of the model: where, of which element and attribute."""
-    for statement, table in tables(model).items():
+    for statement, table in filled(model):
         for element in table.values():
             expression = getattr(element, "expr", None)
             if expression is not None:
@@ -196,7 +214,7 @@ def _fault(source: Source, element: str, message: str) -> Fault:
 def _two_bodies(model: Model) -> Iterator[Fault]:
     """Yield constraints and forces whose markers are on one body, or on ground both."""
     ground = {body.id for body in model.bodies.values() if body.is_ground}
-    for statement, table in tables(model).items():
+    for statement, table in filled(model):
         for element in table.values():
             if getattr(element, "joint_id", None) is not None:
                 continue

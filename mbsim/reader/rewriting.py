@@ -27,12 +27,15 @@ _PLAIN_WORDS = frozenset(("int", "float", "bool", "str", "None", "Source", "tupl
 
 @cache
 def _fields(kind: type) -> tuple[str, ...]:
-    """Return the fields that a dataclass is made of, none of what can hold no expression."""
+    """Return those fields that a dataclass is made of which may hold an expression."""
     if not dataclasses.is_dataclass(kind):
         return ()
     made_of = [each for each in dataclasses.fields(kind) if each.init]
-    words = {word for each in made_of for word in re.findall(r"\w+", str(each.type))}
-    return () if words <= _PLAIN_WORDS else tuple(each.name for each in made_of)
+    return tuple(
+        each.name
+        for each in made_of
+        if not _PLAIN_WORDS.issuperset(re.findall(r"\w+", str(each.type)))
+    )
 
 
 class Rewriting(ABC):

@@ -10,6 +10,8 @@ from mbsim.errors import ModelError
 
 #: Memory that an output time takes while its rows are not there yet [bytes].
 TIME_BYTES = 32
+#: So many bytes are free, or nothing would run here.
+SURELY_FREE = 1 << 24
 #: What a row of a request takes at most [bytes]; signals take no number of a row more than twice.
 REQUEST_BYTES = 8 * 8
 
@@ -33,6 +35,8 @@ def check(
     disk : (Path, int or None), optional
         The folder where they go, and the bytes that are free there; else they stay in memory.
     """
+    if disk is None and rows * at_most < SURELY_FREE:
+        return
     memory = free_memory()
     if disk is None and memory is not None and rows * at_most < memory:
         return
