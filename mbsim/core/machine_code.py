@@ -1,7 +1,7 @@
 """Stored machine code of C functions: written where they are compiled, loaded without Numba.
 
 A file holds what one function was compiled to, as LLVM emitted it, its name in there, and what it
-calls. Only code that raises or makes arrays calls Numba's runtime; loading it imports Numba. Each
+calls. Code that raises or makes arrays calls Numba's runtime (`core.numba_runtime`). Each
 is loaded by an engine of its own: names are unique within a process that compiles, and what is
 loaded comes from many.
 """
@@ -138,16 +138,32 @@ def _target() -> Any:
     return llvm.Target.from_default_triple()
 
 
+def _name_by_numba() -> None:
+    """Let Numba name its runtime, where that could not be done without it."""
+    from mbsim.core.function_cache import name_runtime
+
+    name_runtime()
+
+
+def _name_without_numba() -> None:
+    from mbsim.core.numba_runtime import name_functions
+
+    name_functions()
+
+
+#: What names functions that stored code calls and that are not there yet, one after the other.
+_RUNTIME = (_name_without_numba, _name_by_numba)
+
+
 def load(code: Code) -> Loaded | None:
     """Return a function of stored code; None where what it calls is not there."""
     machine = _target().create_target_machine(jit=True)
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)  # names of the system
-    if not all(map(llvm.address_of_symbol, code.calls)):
-        from mbsim.core.function_cache import name_runtime
-
-        name_runtime()
+    for name_runtime in _RUNTIME:
         if not all(map(llvm.address_of_symbol, code.calls)):
-            return None
+            name_runtime()
+    if not all(map(llvm.address_of_symbol, code.calls)):
+        return None
     engine.add_object_file(llvm.ObjectFileRef.from_data(code.data))
     engine.finalize_object()
     return Loaded(int(engine.get_function_address(code.symbol)), engine)

@@ -1,20 +1,20 @@
 """The time that solving takes: seconds, those left out in which code is compiled or loaded.
 
 A machine compiles a kernel once, and a process loads it once. Numba does both under one lock, whose
-events are heard here. Compiled code asks the same clock (`late`), so that a large factorisation
-ends in time as well.
+events are heard here once something is to be compiled. Compiled code asks the same clock (`late`),
+so that a large factorisation ends in time as well.
 """
 
 from __future__ import annotations
 
 import ctypes
+import functools
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numba.core import event
 
 from mbsim.core import jit
 from mbsim.core.address import call_float
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from mbsim.fclib.problem import Vector
 
 
-class _Preparing(event.Listener):
+class _Preparing:
     """Counts the seconds in which the compiler's lock is held."""
 
     def __init__(self) -> None:
@@ -47,7 +47,6 @@ class _Preparing(event.Listener):
 
 
 _preparing = _Preparing()
-event.register("numba:compiler_lock", _preparing)
 _seen: dict[Callable[..., Any], Callable[..., Any]] = {}
 # perf_counter itself, no function of ours: it takes no notice of Ctrl+C, which would be lost here
 _now = ctypes.CFUNCTYPE(ctypes.c_double)(time.perf_counter)
@@ -88,6 +87,21 @@ def late(until: Vector) -> bool:
     return over
 
 
+@functools.cache
+def _listen() -> None:
+    """Hear of the compiler's lock."""
+    from numba.core import event
+
+    class Lock(event.Listener):
+        def on_start(self, happened: Any) -> None:
+            _preparing.on_start(happened)
+
+        def on_end(self, happened: Any) -> None:
+            _preparing.on_end(happened)
+
+    event.register("numba:compiler_lock", Lock())
+
+
 @contextmanager
 def loading() -> Iterator[None]:
     """Leave out the seconds that the block takes, which loads code."""
@@ -103,6 +117,7 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     found = _seen.get(function)
     if found is None:
         with loading():
+            _listen()
             found = _seen[function] = jit.function(function)
         # looking at arguments of a new kind, and getting the code for them
         for name in ("typeof_pyval", "_compile_for_args"):

@@ -9,7 +9,7 @@ import sys
 import pytest
 
 import mbsim
-from helpers.folders import MODELS
+from helpers.folders import DATA, MODELS
 from mbsim.core import jit
 from mbsim.plugins import friction
 
@@ -69,13 +69,22 @@ def those_of(found, names):
     return [one for one in found if any(f"{one}.".startswith(f"{name}.") for name in names)]
 
 
-#: Decks with a contact; joints; both, and expressions, which one imports `lark` for; friction.
-DECKS = {"drop_m": (), "four_bar": (), "pendulum_wheel": ("lark",), "lugre_stick_slip": ("lark",)}
+#: Decks with a contact; joints; both, and expressions, which one imports `lark` for; friction; a
+#: user's function; boxes, which rest on each other by MOREAU.
+DECKS = {
+    "drop_m": (),
+    "four_bar": (),
+    "pendulum_wheel": ("lark",),
+    "lugre_stick_slip": ("lark",),
+    "bowling_ball": ("mbsim.plugins.friction", "mbsim.plugins.guard", "mbsim.plugins.source"),
+    "rigid/cube_stack": ("mbsim.fclib",),
+}
 
 
 @pytest.mark.parametrize("deck", DECKS)
 def test_a_run_that_finds_its_code_imports_nothing_else(tmp_path, deck):
-    run = ("run", MODELS / f"{deck}.xml", "-o", tmp_path, "--end-time", "0.1")
+    end = "0.02" if deck.startswith("rigid/") else "0.1"
+    run = ("run", MODELS / f"{deck}.xml", "-o", tmp_path, "--end-time", end)
     modules(*run)  # compiles what is not there
     unneeded = [name for name in UNNEEDED if name not in DECKS[deck]]
     found = modules(*run)
@@ -87,6 +96,11 @@ def test_check_needs_no_compiler():
     found = modules("check", MODELS / "drop_m.xml")
     assert those_of(found, UNNEEDED + OF_RUNS) == []
     assert len(found) <= MOST_OF_CHECK
+
+
+def test_what_is_in_a_contact_problem_is_told_without_a_compiler():
+    found = modules("fclib", "info", min((DATA / "fclib").glob("*.hdf5")))
+    assert those_of(found, ("numba", "scipy.linalg", "trimesh")) == []
 
 
 def test_a_subroutine_is_compiled_and_probed_once_a_process(monkeypatch):
