@@ -35,6 +35,10 @@ from mbsim.integrators.scheme import (
 WHOLE, WITHIN, MIDDLE, FITTED = 1, 2, 3, 4
 #: Numbers of a body's position, and of its velocity behind that: v, then w in the body's axes.
 OF_POSITION, SHIFT, SPIN = 7, 7, 10
+#: What a body's way may be off from that of the mean of its velocities, over how far these bend it,
+#: where it met nothing. Joints bring bodies back onto their circles behind a step, which is of
+#: order 3; where steps follow an error, that of lines within them is in it.
+BENT, BENT_BY_JOINTS = 1e-6, 0.1
 
 
 @jitable
@@ -54,7 +58,7 @@ def part_step(p: Problem, m: Method, t: float, h: float, y: F1, out: F1) -> int:
 
 
 @jitable
-def bends(y: F1, new: F1, h: float, i: int) -> bool:
+def bends(y: F1, new: F1, h: float, i: int, part: float) -> bool:
     """Return whether the body whose numbers begin at i met nothing in the step from y to `new`.
 
     Its way is that of the mean of its velocities then, and bent as they change.
@@ -64,7 +68,7 @@ def bends(y: F1, new: F1, h: float, i: int) -> bool:
         v, u = y[c + SHIFT], new[c + SHIFT]
         off = max(off, abs(new[c] - y[c] - 0.5 * h * (v + u)))
         way = max(way, abs(0.5 * h * (u - v)))
-    return off <= 1e-6 * way
+    return off <= part * way
 
 
 @jitable
@@ -81,24 +85,27 @@ def turns(q: F1, i: int) -> tuple[float, float, float, float]:
 
 
 @jitable
-def fit_dense(m: Method, h: float, d: F2) -> None:
-    """Fill the step as straight lines, and positions of bodies that met nothing as parabolas."""
+def fit_dense(m: Method, h: float, d: F2, bent: float) -> None:
+    """Fill the step as straight lines, and positions of bodies that met nothing as parabolas.
+
+    What they may be off by is `bent`, see `bends`.
+    """
     for row in range(parts(m)):
         begin, end = part_of(m, row)
-        fit_part(m, h, d, begin, end)
+        fit_part(m, h, d, (begin, end), bent)
 
 
 @jitable
-def fit_part(m: Method, h: float, d: F2, begin: int, end: int) -> None:
+def fit_part(m: Method, h: float, d: F2, part: tuple[int, int], bent: float) -> None:
     """Fill it for these numbers, which begin with a whole body's."""
-    y, w = m.y, m.trial
+    (begin, end), y, w = part, m.y, m.trial
     for i in range(begin, end):
         d[0, i] = y[i]
         d[1, i] = w[i] - y[i]
         d[2, i] = 0.0
     i = begin
     while i + SPIN + 3 <= end and m.kinds[i] == POSITION:
-        if bends(y, w, h, i):
+        if bends(y, w, h, i, bent):
             for c in range(i, i + 3):
                 d[2, c] = -0.5 * h * (w[c + SHIFT] - y[c + SHIFT])
             first, last = turns(y, i), turns(w, i)
@@ -128,7 +135,7 @@ def attempt(p: Problem, m: Method, t: float, h: float) -> int:
         return code
     if not met:
         # rows are those of the polynomial
-        fit_dense(m, h, d)
+        fit_dense(m, h, d, BENT)
     for row in range(parts(m)):
         first, last = part_of(m, row)
         for i in range(first, last):
@@ -160,10 +167,17 @@ def _attempt_fixed(context: int, t: float, h: float, a: Pointer, b: Pointer) -> 
 def _fit_dense(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """The step as a polynomial."""
     _, m = in_workspace(context)
-    fit_dense(m, h, m.dense)
+    fit_dense(m, h, m.dense, BENT)
+    return 0
+
+
+def _fit_dense_fixed(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
+    """The step as a polynomial, of the length that the deck says."""
+    _, m = in_workspace(context)
+    fit_dense(m, h, m.dense, BENT_BY_JOINTS)
     return 0
 
 
 SCHEME = Scheme(_attempt, _fit_dense, stages=7, last=0, dense=3, order=2.0)
 #: Where the deck fixes the step.
-FIXED_SCHEME = Scheme(_attempt_fixed, _fit_dense, stages=1, last=0, dense=3, order=0.0)
+FIXED_SCHEME = Scheme(_attempt_fixed, _fit_dense_fixed, stages=1, last=0, dense=3, order=0.0)

@@ -100,3 +100,30 @@ def test_stiff_rods_turn_without_a_moment_of_their_own(deck: str) -> None:
     assert np.abs(spin).max() < 2e-3 * np.abs(exact["bodies/2/angular_velocity"]).max()
     total = sum(results[f"energy/{kind}"] for kind in ("kinetic", "potential", "dissipated"))
     assert np.abs(total - total[0]).max() < 1e-3 * results.audit.of
+
+
+def pendulum(step: str) -> str:
+    """Return a deck: a body swings down from level about y."""
+    parts = [
+        text.GROUND,
+        text.marker(10, 1, (0.0, 0.0, 0.0), ACROSS),
+        text.body(2, 1.0, (0.01, 0.01, 0.01), (0.5, 0.0, 0.0)),
+        text.marker(21, 2, (0.0, 0.0, 0.0), ACROSS),
+        text.joint(1, "REVOLUTE", 21, 10),
+        text.gravity(),
+        step,
+    ]
+    return text.deck("a pendulum", parts, 1.0)
+
+
+@pytest.mark.parametrize("h", [0.02, 0.005])
+def test_rows_within_a_step_are_as_good_as_its_ends(h: float) -> None:
+    """Rows every ms are on parabolas within steps of the deck's length."""
+    exact = mbsim.simulate(pendulum(""), integrator="DOP853", tol=1e-11, print_interval=0.001)
+    results = mbsim.simulate(
+        pendulum(f'<Param_Transient h_max="{h}" h_min="{h}"/>'),
+        integrator="MOREAU",
+        print_interval=0.001,
+    )
+    off = np.abs(results["bodies/2/position"] - exact["bodies/2/position"]).max(axis=1)
+    assert off.max() < 1.1 * off[:: round(h * 1000)].max()
