@@ -21,13 +21,13 @@ from mbsim.sensitivity.arrays import (
     ALONG,
     APART,
     ASKED,
-    BEFORE,
     BEGINS,
     DOWN_SIDE,
     ENDS,
-    F_BEFORE,
     FROM,
     IS_LATER,
+    LINE_F,
+    LINE_Y,
     LONG,
     MOST,
     MOST_PARTS,
@@ -74,7 +74,7 @@ def point_at(V: Variations, s: float, out: F1) -> None:
     path, r = V.path, 1.0 - s
     if V.words[STRAIGHT] == 1:
         for i in range(len(out)):
-            out[i] = V.jump[BEFORE, i] + (s - 1.0) * V.line[0] * V.jump[F_BEFORE, i]
+            out[i] = V.jump[LINE_Y, i] + (s - 1.0) * V.line[0] * V.jump[LINE_F, i]
         return
     last = len(path) - 1
     for i in range(len(out)):

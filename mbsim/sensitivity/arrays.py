@@ -37,11 +37,19 @@ SET = 24
 STEADY = 25
 # whether f of the run itself is known in the stages of the step that is taken; whether its path is
 PLAIN, FOLLOWED = 26, 27
-WORDS = 28
+# the kept point, plus 1, whose memories of laws the twin has in place of the committed ones, or 0;
+# whether the last part of a stick was gone over again
+AGAIN, GONE_OVER = 28, 29
+WORDS = 30
 #: Rows of `Variations.far` and `depth`: either side of a difference, and the run itself.
 UP_SIDE, DOWN_SIDE, OWN = range(3)
-#: Rows of `Variations.jump`: y before the commit, f before and behind it.
-BEFORE, F_BEFORE, F_BEHIND = range(3)
+#: Rows of `Variations.jump`: y before the commit, f before and behind it; y and f of the straight
+#: line along which times of changes are looked for.
+BEFORE, F_BEFORE, F_BEHIND, LINE_Y, LINE_F = range(5)
+#: How many committed points are kept, to go on from them again; of `Variations.held`: how many
+#: there are, whether the first one was gone over itself, their rows from the first to the last.
+HELD = 16
+COUNT, SURE, LIST = range(3)
 #: Number of `Variations.line`: how far from the ends of a stretch of a step both sides of a
 #: difference touch alike, over its length.
 APART = 1
@@ -87,7 +95,7 @@ class Variations(NamedTuple):
     rate: F1  # (P,) how much smaller corrections of an implicit method's stages got, one by one
     bends: I1  # (P,) 1 where the last step was taken along the motion
     bent: I1  # (P,) how many steps in a row were
-    jump: tags.Scratch[F2]  # (3, n) see BEFORE
+    jump: tags.Scratch[F2]  # (5, n) see BEFORE
     middle: tags.Scratch[F3]  # (P, ns, most) mean of both sides behind a change of branch
     mode: tags.Scratch[F1]  # (ns,) `State.mode` before it
     reach: F1  # (P,) by how much a parameter may be changed for depths, 0: not known
@@ -119,6 +127,17 @@ class Variations(NamedTuple):
     room: tags.Constant[F1]  # (n,) by how much it may be changed for a difference
     weights: tags.Constant[F1]  # of an explicit method's stages; none where joints hold bodies
     estimates: tags.Constant[F2]  # (1 or 2, stages) of its errors, up to the one at the step's end
+    # of `again`: see COUNT; of the points kept, if any law remembers: time (HELD,), y (HELD, n),
+    # its derivatives (HELD, P, n), what laws remember (HELD, ns, most), its (HELD P, ns, most)
+    held: I1
+    held_time: F1
+    held_y: F2
+    held_d: F3
+    held_memory: F3
+    held_moves: F3
+    # (3, 6, n) motions of the run and of both sides of a parameter; (7, n) slopes of one
+    again: tags.Scratch[F3]
+    slopes: tags.Scratch[F2]
     slope: F2  # (P, n) D' of the last stage of an explicit method, or along the motion
     smooth: I1  # (P,) 1 where that is D' at the committed point
     size: tags.Constant[F1]  # (P,) of a parameter

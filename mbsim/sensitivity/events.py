@@ -38,6 +38,9 @@ from mbsim.sensitivity.arrays import (
     DOWN_TO,
     F_BEFORE,
     F_BEHIND,
+    GONE_OVER,
+    LINE_F,
+    LINE_Y,
     LOST_GRAZING,
     LOST_JUMP,
     ODD,
@@ -93,13 +96,15 @@ def find_times(V: Variations, scene: Scene, t: float, H: float, k: int, what: in
     With a smaller difference where the run is not in their middle: there times are no straight line
     over the parameter. The one is kept that is the nearest to it, as rounding grows the other way.
     """
-    e, best, found = half_step(V, k), math.inf, V.times[k, at]
+    e, best, found, own = half_step(V, k), math.inf, V.times[k, at], 1.0
+    if V.words[GONE_OVER] == 1:
+        own = crossing(V, scene, t - H, H, k, 0.0, what, 1.0)
     found[:] = math.nan
     for _ in range(TRIES):
         up = crossing(V, scene, t - H, H, k, e, what, 1.0)
         down = crossing(V, scene, t - H, H, k, -e, what, 1.0)
         if abs(up - down) < math.inf:
-            bow = abs(up + down - 2.0) / max(abs(up - down), 1e-300)
+            bow = abs(up + down - 2.0 * own) / max(abs(up - down), 1e-300)
             if bow < best:
                 best, found[UP_TO], found[DOWN_TO], found[BY] = bow, up * H - H, down * H - H, e
             if bow <= SURE:
@@ -138,7 +143,7 @@ def ask_beside(V: Variations, scene: Scene, t: float, k: int, x: float, late: fl
     p = in_workspace(V.words[UP])[0]
     set_parameter(V, twin, scene, k, x)
     for i in range(len(w)):
-        w[i] = V.jump[BEFORE, i] + x * V.next[k, i] + late * V.jump[F_BEFORE, i]
+        w[i] = V.jump[LINE_Y, i] + x * V.next[k, i] + late * V.jump[LINE_F, i]
     # rates of forces were those of another point
     twin.work.slot[:, FOUND_AT] = math.nan
     return min(call_int(p.switching, (p.context, t + late, ASK, w, V.work[WITH])), 0)

@@ -29,6 +29,7 @@ from mbsim.integrators.scheme import (
     Method,
     in_workspace,
 )
+from mbsim.sensitivity.again import hold, make_sure
 from mbsim.sensitivity.along import is_too_much, project_end, remember_end, value_within
 from mbsim.sensitivity.arrays import (
     ALONG,
@@ -45,6 +46,8 @@ from mbsim.sensitivity.arrays import (
     JOINTS,
     LAST_ON,
     LAST_UNTIL,
+    LINE_F,
+    LINE_Y,
     LOST_FAILED,
     LOST_JUMP,
     LOST_LARGE,
@@ -279,11 +282,13 @@ def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int
     switched = p.switching != 0 and m.memory[SWITCHED] > 0.0
     for i in range(n):
         V.jump[BEFORE, i], V.jump[F_BEFORE, i] = y[i], f[i]
+        V.jump[LINE_Y, i], V.jump[LINE_F, i] = y[i], f[i]
     # of a very short step, as many end at a branch, the polynomial is all rounding
     V.line[0] = SPAN * m.memory[OWN_TIME]
     V.shift[:] = math.nan
     list_asking(V, scene, switched)
     take_step(V, scene, m, t - h, h)
+    make_sure(V, scene, m, t, switched)
     for k in range(len(V.size)):
         keep_unit(V.next[k], y, len(scene.bodies.mass))
     if switched:
@@ -309,6 +314,7 @@ def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int
             V.d[k, i] = V.next[k, i]
             if not abs(V.d[k, i]) * V.size[k] <= LARGEST * V.scale[i]:
                 lose(V, k, t, LOST_LARGE)
+    hold(V, scene, t, y, switched or anew or V.words[CHANGES] > 0)
     return word
 
 

@@ -20,6 +20,7 @@ from mbsim.results.blocks import Block, Gathered
 from mbsim.results.signal_filter import SignalFilter
 from mbsim.results.signals import signals
 from mbsim.sensitivity import arrays as at
+from mbsim.sensitivity.again import MOTIONS
 from mbsim.sensitivity.along import WORK
 from mbsim.sensitivity.arrays import Variations
 from mbsim.sensitivity.hooks import AT, commit_hook, output_hook, rhs_hook
@@ -139,6 +140,7 @@ class Sensitivities:
                     slope.append(float(table.ravel()[k]))
             first.append(len(place))
         rows, enough = len(scene.rows.time), max(ENOUGH, ENOUGH_TOL * tol)
+        held = at.HELD if shape[1] else 0
         return Variations(
             words=np.zeros(at.WORDS, dtype=np.int64),
             d=start.reshape(count, n).copy(),
@@ -159,7 +161,7 @@ class Sensitivities:
             rate=np.full(count, 0.99),
             bends=np.zeros(count, dtype=np.int64),
             bent=np.zeros(count, dtype=np.int64),
-            jump=np.zeros((3, n)),
+            jump=np.zeros((5, n)),
             end=np.zeros((count, *shape)),
             middle=np.zeros((count, *shape)),
             mode=np.zeros(shape[0]),
@@ -188,6 +190,14 @@ class Sensitivities:
             room=_scale(self.system, n) * _steps(self.system, n),
             weights=np.zeros(0),
             estimates=np.zeros((1, 0)),
+            held=np.concatenate(([0, 0], np.arange(held))),
+            held_time=np.zeros(held),
+            held_y=np.zeros((held, n)),
+            held_d=np.zeros((held, count, n)),
+            held_memory=np.zeros((held, *shape)),
+            held_moves=np.zeros((held * count, *shape)),
+            again=np.zeros((MOTIONS, 6, n)),
+            slopes=np.zeros((7, n)),
             slope=np.zeros((count, n)),
             smooth=np.zeros(count, dtype=np.int64),
             size=np.array([direction.size for direction in self.directions]),

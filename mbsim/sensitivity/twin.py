@@ -16,7 +16,7 @@ from mbsim.core.memory import floats_at
 from mbsim.dynamics.contact.forces import BRANCH, DEPTH
 from mbsim.integrators.scheme import STEPS, Method
 from mbsim.laws.catalog import UNDECIDED
-from mbsim.sensitivity.arrays import ODD, REMEMBERED, SET, UP_SIDE, Variations
+from mbsim.sensitivity.arrays import AGAIN, ODD, REMEMBERED, SET, UP_SIDE, Variations
 
 #: Half of the step of differences, in usual sizes of the parameter and of y.
 STEP = 1e-6
@@ -90,9 +90,13 @@ def set_parameter(V: Variations, twin: Scene, scene: Scene, k: int, e: float) ->
     for j in range(V.first[k], V.first[k + 1]):
         floats_at(V.place[j], 1)[0] = V.base[j] + e * V.rise[j]
     if V.words[REMEMBERED] > 0:
-        state, own = scene.state, twin.state
+        state, own, again = scene.state, twin.state, V.words[AGAIN] - 1
         for s in range(state.memory.shape[0]):
             for j in range(state.memory.shape[1]):
+                if again >= 0:
+                    moves = V.held_moves[again * len(V.size) + k, s, j]
+                    own.memory[s, j] = V.held_memory[again, s, j] + e * moves
+                    continue
                 own.memory[s, j] = state.memory[s, j] + e * V.memory[k, s, j]
                 own.before[s, j] = state.before[s, j] + e * V.before[k, s, j]
 

@@ -205,18 +205,9 @@ def test_rows_within_steps_just_behind_an_impact(integrator):
     assert off(run.sensitivity("bodies/2/velocity/x", name), truth) < 1e-6
 
 
-@pytest.mark.parametrize(
-    ("integrator", "tol", "rel"),
-    [
-        ("DOPRI5", 1e-8, 5e-3),
-        ("DOPRI5", 1e-11, 5e-4),
-        ("DOP853", 1e-9, 5e-4),
-        ("RADAU5", 1e-7, 5e-3),
-        ("RADAU5", 1e-9, 5e-4),
-        ("GALPHA", 1e-7, 5e-3),
-    ],
-)
-def test_stick_and_slip_on_a_belt_are_as_their_closed_form(integrator, tol, rel):
+@pytest.mark.parametrize("integrator", ["DOPRI5", "DOP853", "RADAU5", "GALPHA"])
+@pytest.mark.parametrize("tol", [1e-7, 1e-8, 1e-9, 1e-10])
+def test_stick_and_slip_on_a_belt_are_as_their_closed_form(integrator, tol):
     # it slips from x = mu_s on, 1 by 0.2 later for every unit of mu_s; the spring gives 3e-5
     name = "Force_Contact[301].mu_static"
     how = {"end_time": 6.0, "integrator": integrator, "tol": tol, "print_interval": 0.4}
@@ -227,7 +218,7 @@ def test_stick_and_slip_on_a_belt_are_as_their_closed_form(integrator, tol, rel)
         angle = t - slips
         truth = np.cos(angle) + 5.0 * (0.5 * np.sin(angle) - 0.2 * np.cos(angle))
         assert np.abs(found[(t > 0.0) & (angle < 0.0)]).max() < 4e-5
-        assert found[angle > 0.0] == pytest.approx(truth[angle > 0.0], rel=rel)
+        assert found[angle > 0.0] == pytest.approx(truth[angle > 0.0], rel=5e-4)
 
 
 @pytest.mark.parametrize("integrator", ["DOPRI5", "DOP853", "RADAU5", "GALPHA"])
@@ -305,16 +296,50 @@ def test_rounding_of_the_rates_of_normal_forces_ends_no_derivative(tol, end):
             assert run.parameters[name]["known_until"] == math.inf
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("integrator", ["DOP853", "RADAU5"])
-def test_a_belt_through_six_sticks_and_six_slips(integrator):
-    name = "Force_Contact[301].mu_static"
-    how = {"end_time": 48.5, "print_interval": 0.4}
-    deck, signal = MODELS / "belt_stick_slip.xml", "bodies/2/position/x"
-    run = mbsim.simulate(deck, integrator=integrator, tol=1e-10, sensitivity=[name], **how)
+BELT = MODELS / "belt_stick_slip.xml"
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("Force_Contact[301].mu_static", 1.0), ("Force_Contact[301].mu_dynamic", 0.5)],
+)
+def test_a_belt_through_six_sticks_and_six_slips(name, value):
+    # what sticks moves by 2e-6: a tolerance of 1e-8 knows such a speed to 5e-3
+    how, signal = {"end_time": 48.5, "print_interval": 0.4}, "bodies/2/position/x"
+    truth = differences(BELT, name, value, 3e-4, [signal], integrator="DOP853", **how)[signal]
+    for integrator, tol, most in (
+        ("DOPRI5", 1e-8, 2e-4),
+        ("DOPRI5", 1e-9, 5e-5),
+        ("DOP853", 1e-8, 5e-5),
+        ("RADAU5", 1e-8, 5e-5),
+        ("GALPHA", 1e-8, 5e-5),
+    ):
+        run = mbsim.simulate(BELT, integrator=integrator, tol=tol, sensitivity=[name], **how)
+        assert off(run.sensitivity(signal, name), truth) < most
+
+
+SPRING_OF_FRICTION, NORMAL_SPRING = 'tangential_stiffness="2.5e4"', 'stiffness="1e5" exponent="1"'
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {SPRING_OF_FRICTION: ""},
+        {SPRING_OF_FRICTION: 'tangential_stiffness="1e3"'},
+        {SPRING_OF_FRICTION: f'{SPRING_OF_FRICTION} tangential_damping="5"'},
+        {SPRING_OF_FRICTION: "", NORMAL_SPRING: 'stiffness="1e7" exponent="1.5"'},
+    ],
+    ids=["Mindlin", "soft", "damped", "grows with depth"],
+)
+def test_what_sticks_slips_by_its_slow_stretch_with_any_spring(other):
+    name, signal = "Body_Rigid[2].mass", "bodies/2/position/x"
+    how, deck = {"end_time": 24.0, "print_interval": 0.4}, BELT.read_text()
+    for given, instead in other.items():
+        deck = deck.replace(given, instead)
     truth = differences(deck, name, 1.0, 3e-4, [signal], integrator="DOP853", **how)[signal]
-    # differences themselves are off by 5e-5
-    assert off(run.sensitivity(signal, name), truth) < 3e-4
+    for integrator in ("DOP853", "RADAU5", "GALPHA"):
+        run = mbsim.simulate(deck, integrator=integrator, tol=1e-8, sensitivity=[name], **how)
+        assert off(run.sensitivity(signal, name), truth) < 1e-4
 
 
 @pytest.mark.parametrize("integrator", ["RADAU5", "GALPHA"])
