@@ -143,6 +143,12 @@ RELATION_VALUE, RELATION_SLOPES = range(2)
     FOLD_POWER,
 ) = range(18)
 
+# columns of `Sweep.aim`, and entries of `Sweep.aimed`: the begin of a step that asks for rates of
+# equations that hold accelerations, the time for which it does now, and the work that equations did
+# when velocities were held last
+RATE_BEGUN, ASKED_FOR = range(2)
+AIMED_FROM, AIMED_AT, AIMED_WORK = range(3)
+
 # columns of `Work.noise`
 NOISE_FORCE, NOISE_TORQUE = range(2)
 

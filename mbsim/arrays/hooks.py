@@ -159,6 +159,8 @@ class Joints(IntEnum):
     IMPULSE = 12  # replace impulses on bodies by the changes of their velocities: see `impulses`
     CLOSE = 13  # bring positions onto the equations by the least change in the norm of the masses
     HOLD = 14  # the same of velocities, behind CLOSE
+    AIM = 15  # keep rates of what holds accelerations, at a step's begin
+    ASK = 16  # keep the accelerations that it asks for, in a step's midst
 
 
 class Dry(IntEnum):

@@ -80,6 +80,8 @@ class Sweep(NamedTuple):
     chosen: I1  # (ne + 1,) `Equations.active` before others are chosen
     G: F2  # (terms, 12) of each term: wrench on I's body and on J's, each about its O
     rate: F2  # (ne, 4) residual, its rate, its second rate by velocities alone, rate of its sum
+    aim: F2  # (ne, 2) rate at a step's begin and acceleration asked for within it, of `nearest`
+    aimed: F1  # (3,) see codes
     A: F2  # (ne, ne) how equations act on each other, then its factor
     multiplier: F1  # (ne,)
     rhs: F1  # (ne,)

@@ -242,6 +242,8 @@ def sweep(mechanism: Mechanism) -> Sweep:
         chosen=np.zeros(ne + 1, dtype=np.int64),
         G=np.zeros((len(eq.kind), 12)),
         rate=np.zeros((ne, 4)),
+        aim=np.zeros((ne, 2)),
+        aimed=np.full(3, np.nan),
         A=np.zeros((ne, ne)),
         multiplier=np.zeros(ne),
         rhs=np.zeros(ne),

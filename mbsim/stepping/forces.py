@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import FOLD_POWER, OF_MOTIONS
+from mbsim.arrays.codes import AIMED_AT, AIMED_WORK, FOLD_POWER, OF_MOTIONS
 from mbsim.arrays.hooks import Hook, Joints
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
@@ -37,6 +37,18 @@ def bring_onto_joints(scene: Scene, t: float, y: F1) -> int:
     joints = scene.world.hooks[Hook.JOINTS]
     code = call_int(joints, (scene, Joints.CLOSE, t, y, y))
     return code if code != 0 else call_int(joints, (scene, Joints.HOLD, t, y, y))
+
+
+@jitable
+def bring_to_end(scene: Scene, t: float, y: F1) -> int:
+    """Do the same at the end of a step, with the work that motions do by that; return 0 or a code.
+
+    Rates of motions change within a step: what its end takes of velocities is their work, too.
+    """
+    code, accumulator = bring_onto_joints(scene, t, y), scene.world.accumulators[OF_MOTIONS]
+    if accumulator >= 0 and not passes_fold(scene, t):
+        y[accumulator] += scene.sweep.aimed[AIMED_WORK]
+    return code
 
 
 @jitable
@@ -91,7 +103,12 @@ def hold_by_joints(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> int:
     half, midst, dy = 0.5 * h, S.motion.midst, S.motion.slope
     go_to_midst(scene, S, h, y)
     joints = scene.world.hooks[Hook.JOINTS]
-    code, total = call_int(joints, (scene, Joints.HOLD, t + half, midst, dy)), 0.0
+    code, total = call_int(joints, (scene, Joints.ASK, t + half, midst, dy)), 0.0
+    scene.sweep.aimed[AIMED_AT] = t + half
+    if code == 0:
+        code = call_int(joints, (scene, Joints.HOLD, t + half, midst, dy))
+    # where the step ends: `bring_to_end`
+    scene.sweep.aimed[AIMED_AT] = t + h
     for k in range(len(scene.tree.body)):
         b = scene.tree.body[k]
         at, J = BODY_SIZE * b, scene.bodies.inertia[b]
@@ -166,6 +183,10 @@ def find_motion(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> int:
         wake_loaded(scene, S)
         fill_motion(scene, S, y, h)
         return code
+    if scene.world.hooks[Hook.JOINTS] != 0:
+        code = call_int(scene.world.hooks[Hook.JOINTS], (scene, Joints.AIM, t, y, y))
+        if code != 0:
+            return code
     place_bodies(scene, y)
     start_from(scene, S, y)
     for k in range(BODY_SIZE * len(scene.bodies.mass), len(y)):

@@ -25,7 +25,7 @@ from mbsim.stepping.arrays import (
     Stepping,
 )
 from mbsim.stepping.displacements import comes_at
-from mbsim.stepping.forces import bring_onto_joints
+from mbsim.stepping.forces import bring_to_end
 from mbsim.stepping.step import take_step
 
 #: What impacts may leave off without a word, over tol times the length: `results.audit`.
@@ -89,7 +89,7 @@ def take_part(
     """Take a step as `take_step` does, and bring it back onto joints; return 0 or a code."""
     code = take_step(scene, S, t, h, y, new, committed)
     if code == 0 and scene.world.hooks[Hook.JOINTS] != 0:
-        code = bring_onto_joints(scene, t + h, new)
+        code = bring_to_end(scene, t + h, new)
     return code
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import LISTINGS
+from mbsim.arrays.codes import AIMED_AT, LISTINGS
 from mbsim.arrays.hooks import Contacts, Hook, Joints, failure_or
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, vector_at, view
@@ -21,7 +21,7 @@ from mbsim.stepping.arrays import ALL_STEPS, FIXED, HIT, Stepping
 from mbsim.stepping.audit import examine_step, mark_grounded
 from mbsim.stepping.awake import list_awake, settle
 from mbsim.stepping.displacements import place_within
-from mbsim.stepping.forces import bring_onto_joints
+from mbsim.stepping.forces import bring_to_end
 from mbsim.stepping.friction import keep_yield, part_to_yield
 from mbsim.stepping.halves import take_fixed_step
 from mbsim.stepping.pairs import commit_distances
@@ -140,6 +140,7 @@ def commit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
             return -failure_or(scene, code)
     y = vector_at(a, scene.rows.y.shape[1])
     take_speeds(scene, y, scene.state.fastest)
+    scene.sweep.aimed[AIMED_AT] = math.nan
     accept(scene, t, h, y)
     if h > 0.0 and S.plan.number[FIXED] == 0.0:
         keep_yield(S, h)
@@ -163,7 +164,7 @@ def project(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     scene = view(context, Scene)
     y = vector_at(a, scene.rows.y.shape[1])
     if scene.world.hooks[Hook.JOINTS] != 0:
-        return failure_or(scene, bring_onto_joints(scene, t, y))
+        return failure_or(scene, bring_to_end(scene, t, y))
     return 0
 
 

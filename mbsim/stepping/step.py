@@ -457,7 +457,7 @@ def move_on(scene: Scene, S: Stepping, t: float, h: float, y: F1, new: F1, commi
     keep_left(S, left + left_by_spins(scene, S, new), committed)
     if presses and code == 0:
         if presses_on_driven(scene, S):
-            code = add_work_of_motions(scene, S, t, h, y, new)
+            code = add_work_of_motions(scene, S, t, h, new)
         # impulses may throw bodies farther than was looked for
         if not place_graphics(scene, new):
             code = Code.TOO_FAR

@@ -30,6 +30,8 @@ from mbsim.dynamics.constraints.folding import passes_fold
 from mbsim.dynamics.constraints.impulses import answer_impulses, answer_tree, make_ready
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.nearest import (
+    aim,
+    ask,
     close_all,
     close_tree,
     hold_all_velocities,
@@ -111,6 +113,10 @@ def serve_steps(scene: Scene, what: int, t: float, y: F1, dy: F1) -> int:
         answer_impulses(scene, dy)
     elif what == Joints.CLOSE:
         close_all(scene, t, y)
+    elif what == Joints.AIM:
+        aim(scene, t, y)
+    elif what == Joints.ASK:
+        ask(scene, t, y)
     else:
         hold_all_velocities(scene, t, y)
     return 0
@@ -121,7 +127,7 @@ def serve(scene: Scene, what: int, t: float, y: F1, dy: F1) -> int:
     """Do what joints are asked for (`Joints`); return 0 or a code."""
     if what == Joints.ACCELERATE:
         return constrain(scene, t, y, dy)
-    if Joints.READY <= what <= Joints.HOLD:
+    if Joints.READY <= what <= Joints.ASK:
         return serve_steps(scene, what, t, y, dy)
     if what == Joints.PROJECT_TREE:
         quality = scene.sweep.quality
