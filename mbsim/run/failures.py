@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from mbsim.arrays.codes import AT_FAULT, WORST_BODY
+from mbsim.arrays.codes import AT_FAULT, DRIFT, DRIFTER, WORST_BODY
 from mbsim.core.codes import Code
 from mbsim.errors import PluginError, SolverError
 from mbsim.model.names import element_name
@@ -51,7 +51,9 @@ def give_up(system: System, settings: Settings, method: Any) -> NoReturn:
     elif unsolved:
         where.extend(_held_by(system, body))
     if counts[scheme.LAST_REASON] == problem.BY_JUMP:
-        now, times = memory[scheme.TIME], memory[scheme.LAST_ERROR]
+        # the jump itself, whatever else it puts off
+        now, jump = memory[scheme.TIME], float(system.scene.sweep.quality[DRIFT])
+        times = jump / memory[scheme.TOL] if jump > 0.0 else memory[scheme.LAST_ERROR]
         raise SolverError(
             f"at time {now:.9g} a position or velocity jumps that joints and motions give, by "
             f"{times:.3g} times what a step's error may be: no step goes on; "
@@ -85,8 +87,6 @@ def _held_by(system: System, body: int) -> list[str]:
 
 def _out_of_reach(system: System, settings: Settings) -> list[str]:
     """Return the equation that the step tried last left by more than its error may be."""
-    from mbsim.arrays.codes import DRIFT, DRIFTER
-
     quality = system.scene.sweep.quality
     if not quality[DRIFT] > settings.tol:
         return []
