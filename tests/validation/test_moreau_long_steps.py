@@ -127,3 +127,44 @@ def test_rows_within_a_step_are_as_good_as_its_ends(h: float) -> None:
     )
     off = np.abs(results["bodies/2/position"] - exact["bodies/2/position"]).max(axis=1)
     assert off.max() < 1.1 * off[:: round(h * 1000)].max()
+
+
+def chain(first: int, count: int, z: float, speed: float, joint: str) -> list[str]:
+    """Return links with a ball each in their middle, thrown along z, the farther the faster."""
+    parts = []
+    for k in range(count):
+        b, begin, along = first + k, np.array([k * LENGTH, 0.01 * first, z]), np.eye(3)[0]
+        middle, end = begin + 0.5 * LENGTH * along, begin + LENGTH * along
+        ball = text.attributes(id=100 * b, type="Sphere", center_marker_id=10 * b + 3, radius=0.09)
+        parts += [
+            text.body(b, MASS, ROUND, tuple(middle), velocity=(0.0, 0.0, speed * (1.0 + k))),
+            text.marker(10 * b + 1, b, tuple(begin), ACROSS),
+            text.marker(10 * b + 2, b, tuple(end), ACROSS),
+            text.marker(10 * b + 3, b, tuple(middle)),
+            f"<Post_Graphic {ball}/>",
+        ]
+        if k > 0:
+            parts.append(text.joint(500 + b, joint, 10 * b + 1, 10 * b - 8))
+    return parts
+
+
+@pytest.mark.parametrize("joint", ["SPHERICAL", "REVOLUTE"])
+def test_mechanisms_that_collide_keep_their_momentum(joint: str) -> None:
+    """Two chains, a ball, and the first chain's own ends: impulses move all that joints hold."""
+    law = text.impact(1e5, 1.5, 10.0, 1e-4) | text.coulomb(0.3, 0.01)
+    one, other = [100 * b for b in range(2, 7)], [100 * b for b in range(20, 24)]
+    parts = [
+        text.GROUND,
+        *chain(2, 5, 0.4, -1.0, joint),
+        *chain(20, 4, 0.0, 1.0, joint),
+        text.sphere(40, MASS, 0.1, (0.5, 0.1, -0.3), velocity=(0.0, 0.0, 5.0)),
+        text.contact(301, one, other, **law),
+        text.contact(302, one + other, [4000], **law),
+        text.contact(303, one[:2], one[3:], **law),
+        '<Param_Transient h_max="0.002" h_min="0.002"/>',
+    ]
+    results = mbsim.simulate(text.deck("chains collide", parts, 1.0), integrator="MOREAU")
+    assert results.stats["contact_points"] > 10
+    p, kinetic = momentum(results), results["energy/kinetic"]
+    assert np.abs(p - p[0]).max() < 1e-10 * MASS * 5.0
+    assert kinetic.max() < kinetic[0] * (1.0 + 1e-6)
