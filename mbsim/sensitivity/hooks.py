@@ -29,7 +29,6 @@ from mbsim.integrators.scheme import (
     Method,
     in_workspace,
 )
-from mbsim.sensitivity.again import hold, make_sure
 from mbsim.sensitivity.along import is_too_much, project_end, remember_end, value_within
 from mbsim.sensitivity.arrays import (
     ALONG,
@@ -83,6 +82,7 @@ from mbsim.sensitivity.events import (
 from mbsim.sensitivity.explicit import explicit_step, fit_beside, fit_path
 from mbsim.sensitivity.implicit import implicit_step
 from mbsim.sensitivity.later import UNKNOWN, add, add_motion, give_up, go_on, is_steady, pays
+from mbsim.sensitivity.reintegration import hold, make_sure
 from mbsim.sensitivity.twin import half_step, is_deep, keep_unit, one_side, reach_of, set_parameter
 
 #: Where the packed `Variations` stand: where those of MOREAU would, which takes no part in this.

@@ -20,12 +20,12 @@ from mbsim.results.blocks import Block, Gathered
 from mbsim.results.signal_filter import SignalFilter
 from mbsim.results.signals import signals
 from mbsim.sensitivity import arrays as at
-from mbsim.sensitivity.again import MOTIONS
 from mbsim.sensitivity.along import WORK
 from mbsim.sensitivity.arrays import Variations
 from mbsim.sensitivity.hooks import AT, commit_hook, output_hook, rhs_hook
 from mbsim.sensitivity.implicit import STAGES
 from mbsim.sensitivity.parameters import Direction, replaced, weighed
+from mbsim.sensitivity.reintegration import MOTIONS
 from mbsim.sensitivity.twin import STEP, STEP_OF_CONTACTS
 
 if TYPE_CHECKING:

@@ -301,7 +301,10 @@ BELT = MODELS / "belt_stick_slip.xml"
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("Force_Contact[301].mu_static", 1.0), ("Force_Contact[301].mu_dynamic", 0.5)],
+    [
+        ("Force_Contact[301].mu_static", 1.0),
+        pytest.param("Force_Contact[301].mu_dynamic", 0.5, marks=pytest.mark.slow),
+    ],
 )
 def test_a_belt_through_six_sticks_and_six_slips(name, value):
     # what sticks moves by 2e-6: a tolerance of 1e-8 knows such a speed to 5e-3

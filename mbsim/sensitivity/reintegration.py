@@ -257,7 +257,7 @@ def begin_at(V: Variations, scene: Scene, t: float) -> tuple[int, float]:
 
 
 @jitable
-def run_again(
+def reintegrate(
     V: Variations,
     scene: Scene,
     t: float,
@@ -330,13 +330,13 @@ def go_over(V: Variations, scene: Scene, m: Method, t: float, rate: float) -> No
     most, alone = max(OF_RUN * rate, ROUNDING), max(ALONE * rate, ROUNDING)
     exact = max(OF_DERIVATIVE * rate, ROUNDING_OF_DERIVATIVE)
     row, h = begin_at(V, scene, t)
-    if row >= 0 and run_again(V, scene, t, alone, 1.0, row, h, -1) and is_alike(V, m):
+    if row >= 0 and reintegrate(V, scene, t, alone, 1.0, row, h, -1) and is_alike(V, m):
         keep_run(V)
         V.words[GONE_OVER], late = 1, slips_later(V, scene, t)
         go_on(V, scene, t, late, -1)
         keep_run(V)
         for k in range(len(V.size)):
-            if V.lost[k] == math.inf and run_again(V, scene, t, most, exact, row, h, k):
+            if V.lost[k] == math.inf and reintegrate(V, scene, t, most, exact, row, h, k):
                 go_on(V, scene, t, late, k)
                 for i in range(len(m.y)):
                     change = V.again[MORE, Y, i] - V.again[LESS, Y, i]
