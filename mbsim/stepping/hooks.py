@@ -15,13 +15,13 @@ from mbsim.core.problem import YIELDS, Taken
 from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics
 from mbsim.dynamics.bodies.scales import take_speeds
 from mbsim.dynamics.contact.detection import find_contacts
-from mbsim.dynamics.pipeline.hooks import accept
+from mbsim.dynamics.pipeline.hooks import accept, normalise_quaternions
 from mbsim.dynamics.pipeline.output import no_room, scaled_error
 from mbsim.stepping.arrays import ALL_STEPS, FIXED, HIT, Stepping
 from mbsim.stepping.audit import examine_step, mark_grounded
 from mbsim.stepping.awake import list_awake, settle
 from mbsim.stepping.displacements import place_within
-from mbsim.stepping.forces import bring_to_end
+from mbsim.stepping.forces import bring_onto_joints, bring_to_end
 from mbsim.stepping.friction import keep_yield, part_to_yield
 from mbsim.stepping.halves import take_fixed_step
 from mbsim.stepping.pairs import commit_distances
@@ -160,12 +160,17 @@ def commit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
 
 
 def project(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
-    """Bodies back onto their constraints, by the least change: steps are long."""
+    """Quaternions back to unit length, and bodies onto their constraints by the least change.
+
+    With h = 0, at a row within a step, motions do no work by that.
+    """
     scene = view(context, Scene)
     y = vector_at(a, scene.rows.y.shape[1])
-    if scene.world.hooks[Hook.JOINTS] != 0:
-        return failure_or(scene, bring_to_end(scene, t, y))
-    return 0
+    normalise_quaternions(scene, y)
+    if scene.world.hooks[Hook.JOINTS] == 0:
+        return 0
+    code = bring_to_end(scene, t, y) if h > 0.0 else bring_onto_joints(scene, t, y)
+    return failure_or(scene, code)
 
 
 #: By their names in `Problem`, in place of those of compliant contact.

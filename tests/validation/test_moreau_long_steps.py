@@ -168,3 +168,22 @@ def test_mechanisms_that_collide_keep_their_momentum(joint: str) -> None:
     p, kinetic = momentum(results), results["energy/kinetic"]
     assert np.abs(p - p[0]).max() < 1e-10 * MASS * 5.0
     assert kinetic.max() < kinetic[0] * (1.0 + 1e-6)
+
+
+@pytest.mark.parametrize("method", ["MOREAU", "DOPRI5", "DOP853", "RADAU5", "GALPHA"])
+@pytest.mark.parametrize("step", ["", '<Param_Transient h_max="0.02" h_min="0.02"/>'])
+@pytest.mark.parametrize("held", [False, True])
+def test_quaternions_of_rows_have_unit_length(method: str, step: str, held: bool) -> None:
+    """Rows within steps are interpolated, number by number."""
+    parts = [
+        text.GROUND,
+        text.marker(10, 1, (0.0, 0.0, 0.0)),
+        text.body(2, 1.0, (0.01, 0.02, 0.03), (0.0, 0.0, 0.0), spin=(5.0, 3.0, 8.0)),
+        *([text.joint(1, "SPHERICAL", 20, 10)] if held else []),
+        step if method == "MOREAU" else "",
+    ]
+    results = mbsim.simulate(
+        text.deck("a body spins", parts, 0.5), integrator=method, tol=1e-3, print_interval=0.001
+    )
+    sizes = np.linalg.norm(results["bodies/2/quaternion"], axis=1)
+    assert np.abs(sizes - 1.0).max() < 1e-14

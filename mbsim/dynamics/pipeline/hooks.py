@@ -105,15 +105,21 @@ def rhs(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     return failure_or(scene, evaluate(scene, t, h, vector_at(a, n), vector_at(b, n)))
 
 
-def _project(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
-    """Quaternions back to unit length, and bodies onto their constraints."""
-    scene = view(context, Scene)
-    y = vector_at(a, scene.rows.y.shape[1])
+@jitable
+def normalise_quaternions(scene: Scene, y: F1) -> None:
+    """Bring the quaternions of bodies awake back to unit length."""
     for row in range(bodies_awake(scene)):
         at = BODY_SIZE * body_awake(scene, row) + 3
         length = math.sqrt(y[at] ** 2 + y[at + 1] ** 2 + y[at + 2] ** 2 + y[at + 3] ** 2)
         for k in range(4):
             y[at + k] /= length
+
+
+def _project(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
+    """Quaternions back to unit length, and bodies onto their constraints."""
+    scene = view(context, Scene)
+    y = vector_at(a, scene.rows.y.shape[1])
+    normalise_quaternions(scene, y)
     if scene.world.hooks[Hook.JOINTS] != 0:
         what = Joints.ALONG if h == ALONG else Joints.PROJECT
         code = call_int(scene.world.hooks[Hook.JOINTS], (scene, what, t, y, y))
