@@ -11,8 +11,17 @@ from mbsim.core.address import call_int
 from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
-from mbsim.core.layout import AT_V, AT_W, BODY_SIZE
-from mbsim.core.rotation import add, cross, rotate, scale, sub, unrotate, vector
+from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
+from mbsim.core.rotation import (
+    add,
+    cross,
+    matrix_from_quaternion,
+    rotate,
+    scale,
+    sub,
+    unrotate,
+    vector,
+)
 from mbsim.dynamics.bodies.acceleration import accelerate
 from mbsim.dynamics.bodies.configuration import turn
 from mbsim.dynamics.bodies.kinematics import place_bodies
@@ -74,11 +83,12 @@ def go_to_midst(scene: Scene, S: Stepping, h: float, y: F1) -> None:
         way = scale(half, add(v, scale(0.5 * share, sub(vector(middle, at + AT_V), v))))
         back = sub(sub(vector(middle, at), vector(y, at)), way)
         push = sub(vector(work.force[b]), scale(m, vector(scene.world.gravity)))
-        torque = unrotate(work.R[b], add(vector(work.torque[b]), cross(back, push)))
-        alpha = rotate(bodies.inverse[b], torque)
         half_way = spin_by_midpoint(bodies.inertia[b], w, (0.0, 0.0, 0.0), half)
         mean = add(w, scale(0.5 * share, sub(spin, w)))
         turn(y, at, half, mean[0], mean[1], mean[2], midst)
+        matrix_from_quaternion(midst[at + AT_Q : at + AT_V], work.R[b])
+        torque = unrotate(work.R[b], add(vector(work.torque[b]), cross(back, push)))
+        alpha = rotate(bodies.inverse[b], torque)
         for c in range(3):
             midst[at + c] = y[at + c] + way[c]
             midst[at + AT_V + c] = v[c] + half * work.force[b, c] / m
@@ -181,7 +191,7 @@ def find_motion(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> int:
     if not is_implicit(S) and scene.world.hooks[Hook.JOINTS] == 0:
         code = find_forces(scene, t, y, dy)
         wake_loaded(scene, S)
-        fill_motion(scene, S, y, h)
+        fill_motion(scene, S, y, y, h)
         return code
     if scene.world.hooks[Hook.JOINTS] != 0:
         code = call_int(scene.world.hooks[Hook.JOINTS], (scene, Joints.AIM, t, y, y))
@@ -202,5 +212,5 @@ def find_motion(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> int:
             return code
     turn_to_global(scene, dy)
     place_bodies(scene, y)
-    fill_motion(scene, S, y, h)
+    fill_motion(scene, S, y, middle, h)
     return take_into_step(scene, S, h, dy, True) if is_implicit(S) else 0

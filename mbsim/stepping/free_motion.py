@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
@@ -20,7 +22,7 @@ from mbsim.core.rotation import (
 )
 from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
 from mbsim.dynamics.bodies.configuration import turn
-from mbsim.stepping.arrays import ASLEEP, Stepping
+from mbsim.stepping.arrays import ASLEEP, THETA, Stepping
 
 #: Newton iterations for the spin of a body at most.
 MOST_SPINS = 12
@@ -78,23 +80,42 @@ def spin_by_midpoint(J: F2, before: V3, T: V3, h: float) -> V3:
 
 
 @jitable
-def spin_freely(scene: Scene, y: F1, b: int, h: float) -> V3:
+def midst_of(y: F1, found: F1, at: int, part: float, q: F1) -> None:
+    """Write the quaternion of the body at y[at] in the midst of a step; `part` of it is `found`."""
+    same, size = 0.0, 0.0
+    for c in range(at + AT_Q, at + AT_V):
+        same += y[c] * found[c]
+    for c in range(AT_Q, AT_V):
+        there = found[at + c] if same >= 0.0 else -found[at + c]
+        q[c] = y[at + c] + 0.5 / part * (there - y[at + c])
+        size += q[c] * q[c]
+    for c in range(AT_Q, AT_V):
+        q[c] /= math.sqrt(size)
+
+
+@jitable
+def spin_freely(scene: Scene, S: Stepping, y: F1, found: F1, b: int, h: float) -> V3:
     """Return the angular velocity after h, global axes, of a body that no joint holds.
 
-    The attitude is turned by the mean of spins, see `spin_by_midpoint`.
+    The attitude is turned by the mean of spins, see `spin_by_midpoint`. The torque that was found
+    at `found`, at y or at the part theta of the step, turns into the body's axes in the midst.
     """
-    R, J, torque = scene.work.R[b], scene.bodies.inertia[b], scene.work.torque[b]
-    if is_round(J) and torque[0] == 0.0 and torque[1] == 0.0 and torque[2] == 0.0:
+    J, T = scene.bodies.inertia[b], vector(scene.work.torque[b])
+    pushed = T[0] != 0.0 or T[1] != 0.0 or T[2] != 0.0
+    if is_round(J) and not pushed:
         return vector(scene.work.w[b])
     at = BODY_SIZE * b
+    q, R = y[at : at + BODY_SIZE].copy(), scene.work.R[b].copy()
+    if pushed:
+        midst_of(y, found, at, S.forces.number[THETA], q)
+        matrix_from_quaternion(q[AT_Q:], R)
+        T = unrotate(R, T)
     before = vector(y, at + AT_W)
-    w = spin_by_midpoint(J, before, unrotate(R, vector(torque)), h)
+    w = spin_by_midpoint(J, before, T, h)
     m = scale(0.5, add(before, w))
-    q = y[at : at + BODY_SIZE].copy()
-    S = R.copy()
     turn(y[at : at + BODY_SIZE], 0, h, m[0], m[1], m[2], q)
-    matrix_from_quaternion(q[AT_Q:], S)
-    return rotate(S, w)
+    matrix_from_quaternion(q[AT_Q:], R)
+    return rotate(R, w)
 
 
 @jitable
@@ -137,10 +158,11 @@ def turn_to_global(scene: Scene, dy: F1) -> None:
 
 
 @jitable
-def fill_motion(scene: Scene, S: Stepping, y: F1, h: float) -> None:
+def fill_motion(scene: Scene, S: Stepping, y: F1, found: F1, h: float) -> None:
     """Fill velocities before the step and without contacts, and inverse masses.
 
-    Bodies are as at the step's begin; accelerations are those of `turn_to_global`.
+    Bodies are as at the step's begin, y; forces were found at `found`; accelerations are those of
+    `turn_to_global`.
     """
     M, bodies, dy = S.motion, scene.bodies, S.motion.slope
     stand(S, len(bodies.mass))
@@ -158,7 +180,7 @@ def fill_motion(scene: Scene, S: Stepping, y: F1, h: float) -> None:
         if scene.tree.of_body[b] >= 0:
             w = add(w, scale(h, vector(dy, at + AT_W)))
         else:
-            w = spin_freely(scene, y, b, h)
+            w = spin_freely(scene, S, y, found, b, h)
         for c in range(3):
             free[3 + c] = w[c]
         for r in range(3):

@@ -365,7 +365,7 @@ def solve_by_middle(scene: Scene, S: Stepping, t: float, h: float, y: F1, commit
         return code
     turn_to_global(scene, dy)
     place_bodies(scene, y)
-    fill_motion(scene, S, y, h)
+    fill_motion(scene, S, y, middle, h)
     if is_implicit(S):
         code = take_into_step(scene, S, h, dy, False)
         if code != 0:

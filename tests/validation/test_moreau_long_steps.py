@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import mbsim
 from helpers.folders import MODELS
@@ -100,6 +101,36 @@ def test_stiff_rods_turn_without_a_moment_of_their_own(deck: str) -> None:
     assert np.abs(spin).max() < 2e-3 * np.abs(exact["bodies/2/angular_velocity"]).max()
     total = sum(results[f"energy/{kind}"] for kind in ("kinetic", "potential", "dissipated"))
     assert np.abs(total - total[0]).max() < 1e-3 * results.audit.of
+
+
+def test_stiff_springs_between_held_bodies_leave_angular_momentum() -> None:
+    """Three bodies on a ball joint and a hinge, and springs far shorter in period than steps."""
+    bodies = {
+        2: (1.0, (0.01, 0.02, 0.015), (0.0, 0.0, 0.0), (1.0, 0.0, 0.3), (5.0, 3.0, 8.0)),
+        3: (2.0, (0.02, 0.012, 0.02), (0.3, 0.1, 0.0), (1.0, 1.0, 0.0), (5.0, 3.0, 8.0)),
+        4: (0.5, (0.003, 0.004, 0.005), (0.3, 0.4, 0.1), (1.0, 1.0, -1.0), (1.0, -3.0, 2.0)),
+    }
+    parts = [text.GROUND]
+    for b, (mass, inertia, place, velocity, spin) in bodies.items():
+        parts += [
+            text.body(b, mass, inertia, place, velocity, spin),
+            text.marker(10 * b + 1, b, (0.15, 0.05, 0.0)),
+            text.marker(10 * b + 2, b, (0.3, 0.25, 0.1), ACROSS),
+        ]
+    for n, (i, j, length) in enumerate(((30, 22, 0.2), (40, 31, 0.4)), 1):
+        names = text.attributes(id=n, i_marker_id=i, j_marker_id=j, stiffness=1e5, length=length)
+        parts.append(f'<Force_SpringDamper type="TRANSLATIONAL" {names}/>')
+    parts += [text.joint(1, "SPHERICAL", 31, 21), text.joint(2, "REVOLUTE", 42, 32)]
+    parts.append('<Param_Transient h_max="0.001" h_min="0.001"/>')
+    results = mbsim.simulate(text.deck("held by springs", parts, 0.5), integrator="MOREAU")
+    total = 0.0
+    for b, (mass, inertia, *_) in bodies.items():
+        names = ("position", "velocity", "angular_velocity", "quaternion")
+        x, v, w, q = (results[f"bodies/{b}/{name}"] for name in names)
+        turn = Rotation.from_quat(q, scalar_first=True)
+        own = turn.apply(np.array(inertia) * turn.inv().apply(w))
+        total = total + mass * np.cross(x, v) + own
+    assert np.abs(total - total[0]).max() < 0.02 * np.abs(total[0]).max()
 
 
 def pendulum(step: str) -> str:
