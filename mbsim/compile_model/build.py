@@ -9,12 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mbsim.arrays import codes
+from mbsim.arrays.codes import WHOLE
 from mbsim.arrays.hooks import Hook
 from mbsim.arrays.model import Bodies, Programs, Residuals, Scales, World
 from mbsim.arrays.scene import Scene
@@ -41,6 +43,7 @@ from mbsim.compile_model.switching import has_modes, sticking
 from mbsim.compile_model.user_code import UserCode, load_user_code, no_residuals, users_table
 from mbsim.core.collection import no_collection
 from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
+from mbsim.expressions.elementary import TIME
 from mbsim.model.elements import Gravity, Model
 from mbsim.model.names import element_name
 from mbsim.model.placement import Placement, place
@@ -200,6 +203,13 @@ def _varies(pulls: Sequence[Pull]) -> bool:
     return any((pull.program >= 0).any() for pull in pulls)
 
 
+def _drives(model: Model, acts: Acting) -> bool:
+    """Return whether a motion, or a constraint whose expression follows TIME, may do work."""
+    equations = acts.mechanism.equations
+    programs = (acts.programs.programs[k] for k in equations.program[equations.general == WHOLE])
+    return bool(model.motions) or any(code.op == TIME for code in chain.from_iterable(programs))
+
+
 def _start(
     model: Model, placement: Placement, contacts: ContactTables, acts: Acting, judged: _Judged
 ) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any], np.ndarray[Any, Any], Residuals]:
@@ -210,7 +220,7 @@ def _start(
     carried, has_friction = contacts.carried, contacts.laws.friction_law != 0
     states, first_state = acts.states, BODY_SIZE * len(placement.bodies) + carried
     nz, damps = len(states.program), len(acts.applied_ids) > 0 or _varies(acts.pulls)
-    accumulators = _accumulators(bool(model.motions), damps, first_state + nz)
+    accumulators = _accumulators(_drives(model, acts), damps, first_state + nz)
     kept = int(np.count_nonzero(accumulators >= 0))
     friction_at = np.where(has_friction, first_state + nz + kept + np.cumsum(has_friction) - 1, -1)
     kept += int(has_friction.sum()) + max(1, len(model.contacts))
