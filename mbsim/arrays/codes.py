@@ -149,6 +149,9 @@ RELATION_VALUE, RELATION_SLOPES = range(2)
 RATE_BEGUN, ASKED_FOR = range(2)
 AIMED_FROM, AIMED_AT, AIMED_WORK = range(3)
 
+#: Impulses that trees of joints answer at once, those of five points (`impulses`).
+AT_ONCE = 16
+
 # columns of `Work.noise`
 NOISE_FORCE, NOISE_TORQUE = range(2)
 

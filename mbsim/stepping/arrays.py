@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mbsim.arrays.codes import AT_ONCE
 from mbsim.core import tags
 from mbsim.core.arrays import F1, F2, F3, I1, I2
 
@@ -142,8 +143,11 @@ class Motion(NamedTuple):
     taken: I1  # (pairs + 1,) the try of a step in which a pair has points by that; last: this one
     measured: I1  # (pairs,) 1 + list of near pairs in which its rows were measured, 0: none
     impulse: F1  # (ny,) impulses on bodies, then what they change of velocities
-    six: F3  # (nb, 6, 6) six impulses on bodies, then what they change, if joints hold any
-    shares: F3  # (nb, 6, 6) of joints in them
+    columns: F3  # (nb, 6, AT_ONCE) impulses on a tree's bodies, then what they change, see `held`
+    shares: F3  # (nb, 6, AT_ONCE) of joints in them
+    loaded: I1  # (nb,) 1 where there are such impulses, by tree indices
+    listed: I1  # (nb,) first point of a tree, by tree indices of roots
+    batch: I1  # (AT_ONCE // 3,) points at hand
     middle: F1  # (ny,) state within a step at which forces are found
     midst: F1  # (ny,) state in the midst of a step at which joints hold, see `forces`
     aside: F1  # (ny,) that, bodies moved along what an impact does to their ways
@@ -171,7 +175,8 @@ class Points(NamedTuple):
     many: I1  # (m,) its rows there
     near: I1  # (m,) the first ones of them, of bodies that have points themselves
     moved: I1  # (wide rows,) bodies that r moves
-    moves: F3  # (wide rows, 6, 3) their velocities by r
+    moves: F3  # (wide rows, 3, 6) their velocities by components of r
+    listed: I2  # (m, 2) next point of the trees of its bodies, see `held.list_by_trees`
     touches: I1  # (nb,) points of a body that joints or forces hold, see `held`
     answer: I1  # (nb,) first row of `answers` for wrenches on it, -1 for none
     answered: I1  # (1,) rows of `answers` in use
@@ -310,7 +315,8 @@ def no_points(m: int, nb: int, wide: int) -> Points:
         many=whole(m),
         near=whole(m),
         moved=whole(wide),
-        moves=numbers(wide, 6, 3),
+        moves=numbers(wide, 3, 6),
+        listed=whole(m, 2),
         touches=whole(nb),
         answer=whole(nb),
         answered=whole(1),
@@ -348,6 +354,7 @@ def make(
     """
     nb, ng, ny, m, pairs, wide, groups, nz = sizes
 
+    held = nb if len(plan.members) > 0 else 0
     motion = Motion(
         inverse=numbers(nb, 6, 6),
         before=numbers(nb + 1, 6),
@@ -370,8 +377,11 @@ def make(
         taken=whole(pairs + 1),
         measured=whole(pairs),
         impulse=numbers(ny),
-        six=numbers(nb if len(plan.members) > 0 else 0, 6, 6),
-        shares=numbers(nb if len(plan.members) > 0 else 0, 6, 6),
+        columns=numbers(held, 6, AT_ONCE),
+        shares=numbers(held, 6, AT_ONCE),
+        loaded=whole(held),
+        listed=whole(held),
+        batch=whole(AT_ONCE // 3),
         middle=numbers(ny),
         midst=numbers(ny),
         aside=numbers(ny),

@@ -101,6 +101,6 @@ def _answers(S: Stepping, count: int, alone: Any) -> Any:
         moved = np.zeros((alone.shape[0], 3))
         for row in range(P.wide[k], P.wide[k] + P.many[k]):
             b = 6 * P.moved[row]
-            moved[b : b + 6] += P.moves[row]
+            moved[b : b + 6] += P.moves[row].T
         columns.append(sparse.csc_array(moved))
     return sparse.hstack(columns, format="csc")

@@ -3,7 +3,7 @@
 An impulse moves all bodies of a group then. What it does to them takes a solution of the group's
 linear system, for each of its three components; or, where a body has many points, for each of the
 six components of a wrench on the body, of which the impulses of all its points are made. Where the
-tree of joints is all that holds them, the impulses of two points are answered at once.
+tree of joints is all that holds them, the impulses of four points are answered at once.
 """
 
 from __future__ import annotations
@@ -12,9 +12,15 @@ from mbsim.arrays.hooks import Hook, Joints, note_failure
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
 from mbsim.core.jitable import jitable
-from mbsim.dynamics.constraints.impulses import answer_six, clear_six
+from mbsim.core.rotation import scale, vector
+from mbsim.dynamics.constraints.impulses import (
+    add_impulse,
+    answer_columns,
+    clear_columns,
+    write_column,
+)
 from mbsim.dynamics.constraints.in_use import active_count
-from mbsim.stepping.arrays import ALL_ANSWERS, POINTS, Stepping
+from mbsim.stepping.arrays import ALL_ANSWERS, AXES, POINTS, TURN, Stepping
 from mbsim.stepping.implicit import is_implicit, yield_to_forces
 from mbsim.stepping.one_point import alone, direction
 
@@ -142,78 +148,118 @@ def add_answer(S: Stepping, k: int, side: int, a: int) -> None:
         for e in range(6):
             part = direction(P, k, side, a, e)
             for c in range(6):
-                P.moves[row, c, a] += part * answer[c, e]
+                P.moves[row, a, c] += part * answer[c, e]
 
 
 @jitable
-def comes_in_six(scene: Scene, S: Stepping) -> bool:
-    """Return whether what impulses do is found for six at once: the tree of joints is all."""
+def comes_in_columns(scene: Scene, S: Stepping) -> bool:
+    """Return whether what impulses do is found for several points at once: no equations hold."""
     return active_count(scene) == 0 and not is_implicit(S)
 
 
 @jitable
-def root_of(scene: Scene, S: Stepping, b: int) -> int:
+def root_of(scene: Scene, b: int) -> int:
     """Return the root of a body's tree, -1 if no joint holds it."""
-    return scene.tree.root[scene.tree.of_body[b]] if S.plan.group[b] >= 0 else -1
+    at = scene.tree.of_body[b]
+    return scene.tree.root[at] if at >= 0 else -1
 
 
 @jitable
-def answer_points(scene: Scene, S: Stepping, first: int, second: int) -> None:
-    """Fill what impulses at two points do, whose bodies are listed; `second` may be `first`."""
-    P, plan, six = S.points, S.plan, S.motion.six
-    i, j, m, n = P.body[first, 0], P.body[first, 1], P.body[second, 0], P.body[second, 1]
-    roots = root_of(scene, S, i), root_of(scene, S, j), root_of(scene, S, m), root_of(scene, S, n)
-    for k in (first, second):
-        for row in range(P.wide[k], P.wide[k] + P.many[k]):
-            clear_six(six[P.moved[row]])
-    for part in range(2):
-        k = first if part == 0 else second
-        for side in range(2):
-            b = P.body[k, side]
-            if plan.group[b] >= 0:
-                for a in range(3):
-                    for c in range(6):
-                        six[b, c, 3 * part + a] += direction(P, k, side, a, c)
-    answer_six(scene, roots, six, S.motion.shares)
-    S.tally.count[ALL_ANSWERS] += 6 if second != first else 3
-    for part in range(2):
-        k = first if part == 0 else second
-        for row in range(P.wide[k], P.wide[k] + P.many[k]):
-            b, moves = P.moved[row], P.moves[row]
-            if plan.group[b] >= 0:
-                found, e = six[b], 3 * part
+def list_by_trees(scene: Scene, S: Stepping) -> None:
+    """Fill which points each tree has: `Motion.listed` by roots, then `Points.listed`.
+
+    Entries are 2 k + side, 0 is none: they are counted from 2 on.
+    """
+    P, listed = S.points, S.motion.listed
+    for at in range(len(scene.tree.body)):
+        listed[at] = 0
+    for k in range(S.tally.count[POINTS] - 1, -1, -1):
+        if P.wide[k] < 0:
+            continue
+        i, j = root_of(scene, P.body[k, 0]), root_of(scene, P.body[k, 1])
+        for side, root in ((0, i), (1, j if j != i else -1)):
+            if root >= 0:
+                P.listed[k, side] = listed[root]
+                listed[root] = 2 * k + side + 2
+
+
+@jitable
+def load_point(scene: Scene, S: Stepping, root: int, k: int, column: int) -> None:
+    """Fill three columns of forces on the tree at `root` by unit impulses at point k."""
+    P, M, tree = S.points, S.motion, scene.tree
+    for side in range(2):
+        at = tree.of_body[P.body[k, side]]
+        if at < 0 or tree.root[at] != root:
+            continue
+        if M.loaded[at] == 0:
+            M.loaded[at] = 1
+            clear_columns(M.columns[at])
+        row, sign = P.given[k], 1.0 - 2.0 * side
+        for a in range(3):
+            push = scale(sign, vector(row, AXES + 3 * a))
+            turn = scale(sign, vector(row, TURN + 9 * side + 3 * a))
+            add_impulse(scene, at, M.columns[at], column + a, push, turn)
+
+
+@jitable
+def keep_answers(scene: Scene, S: Stepping, root: int, k: int, column: int) -> None:
+    """Fill what impulses at point k do to the bodies of the tree at `root`.
+
+    With the first tree that the point has, to bodies that it moves alone or not at all, too.
+    """
+    P, tree, ground = S.points, scene.tree, len(S.motion.inverse)
+    i, j = P.body[k, 0], P.body[k, 1]
+    roots = root_of(scene, i), root_of(scene, j)
+    first = root == (roots[0] if roots[0] >= 0 else roots[1])
+    for row in range(P.wide[k], P.wide[k] + P.many[k]):
+        b, moves = P.moved[row], P.moves[row]
+        at, its = tree.of_body[b], root_of(scene, b)
+        if its == root:
+            for a in range(3):
+                write_column(scene, at, S.motion.columns[at], column + a, moves[a])
+        elif first and its not in roots:
+            side = 0 if b == i else 1
+            for a in range(3):
                 for c in range(6):
-                    moves[c, 0], moves[c, 1] = found[c, e], found[c, e + 1]
-                    moves[c, 2] = found[c, e + 2]
-                continue
-            side = 0 if b == P.body[k, 0] else 1
-            for c in range(6):
-                for a in range(3):
-                    moves[c, a] = alone(P, k, side, a, c)
+                    moves[a, c] = alone(P, k, side, a, c) if at < 0 and b != ground else 0.0
+
+
+@jitable
+def answer_tree_points(scene: Scene, S: Stepping, root: int) -> None:
+    """Fill what impulses at the points of a tree do, for `AT_ONCE` columns in turn."""
+    P, M, batch = S.points, S.motion, S.motion.batch
+    entry, count = M.listed[root], 0
+    while entry > 0:
+        k, side = (entry - 2) // 2, (entry - 2) % 2
+        load_point(scene, S, root, k, 3 * count)
+        batch[count] = k
+        count += 1
+        entry = P.listed[k, side]
+        if entry > 0 and count < len(batch):
+            continue
+        answer_columns(scene, root, M.columns, M.shares, M.loaded)
+        S.tally.count[ALL_ANSWERS] += 3 * count
+        for place in range(count):
+            keep_answers(scene, S, root, batch[place], 3 * place)
+        count = 0
 
 
 @jitable
 def answer_listed(scene: Scene, S: Stepping) -> None:
     """Fill what impulses do at all points of held bodies that `widen` has listed alone."""
-    P, before = S.points, -1
-    if not comes_in_six(scene, S):
+    if not comes_in_columns(scene, S):
         return
-    for k in range(S.tally.count[POINTS]):
-        if P.wide[k] >= 0:
-            if before >= 0:
-                answer_points(scene, S, before, k)
-                before = -1
-            else:
-                before = k
-    if before >= 0:
-        answer_points(scene, S, before, before)
+    list_by_trees(scene, S)
+    for at in range(len(scene.tree.body)):
+        if S.motion.listed[at] > 0:
+            answer_tree_points(scene, S, at)
 
 
 @jitable
 def widen(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
     """Fill what impulses at point k do where joints or forces hold its bodies: rows from `begin`.
 
-    Where that comes in six it is left to `answer_listed`. Return False if there is no room.
+    Where that comes in columns it is left to `answer_listed`. Return False if there is no room.
     """
     P, plan, impulse = S.points, S.plan, S.motion.impulse
     P.wide[k] = -1
@@ -222,7 +268,7 @@ def widen(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
     P.wide[k] = begin
     if not list_moved(S, k):
         return False
-    if comes_in_six(scene, S):
+    if comes_in_columns(scene, S):
         return True
     known = (
         plan.group[P.body[k, 0]] >= 0 and answer_body(scene, S, P.body[k, 0]),
@@ -248,10 +294,10 @@ def widen(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
             side = 0 if b == P.body[k, 0] else 1
             for c in range(6):
                 if plan.group[b] < 0:
-                    P.moves[row, c, a] = alone(P, k, side, a, c)
+                    P.moves[row, a, c] = alone(P, k, side, a, c)
                 else:
                     found = unknown[0] or unknown[1]
-                    P.moves[row, c, a] = impulse[6 * b + c] if found else 0.0
+                    P.moves[row, a, c] = impulse[6 * b + c] if found else 0.0
         for side in range(2):
             if known[side]:
                 add_answer(S, k, side, a)

@@ -67,7 +67,7 @@ def apply(p: Points, k: int, v: F2, r: V3) -> None:
         for row in range(p.wide[k], p.wide[k] + p.near[k]):
             b, moves = p.moved[row], p.moves[row]
             for c in range(6):
-                v[b, c] += moves[c, 0] * r[0] + moves[c, 1] * r[1] + moves[c, 2] * r[2]
+                v[b, c] += moves[0, c] * r[0] + moves[1, c] * r[1] + moves[2, c] * r[2]
         return
     row, i, j = p.given[k], p.body[k, 0], p.body[k, 1]
     x = row[0] * r[0] + row[3] * r[1] + row[6] * r[2]
@@ -102,7 +102,7 @@ def apply_farther(p: Points, k: int, v: F2, r: V3) -> None:
         for row in range(p.wide[k] + p.near[k], p.wide[k] + p.many[k]):
             b, moves = p.moved[row], p.moves[row]
             for c in range(6):
-                v[b, c] += moves[c, 0] * r[0] + moves[c, 1] * r[1] + moves[c, 2] * r[2]
+                v[b, c] += moves[0, c] * r[0] + moves[1, c] * r[1] + moves[2, c] * r[2]
 
 
 @jitable
@@ -122,14 +122,23 @@ def alone(p: Points, k: int, side: int, a: int, c: int) -> float:
 
 
 @jitable
-def answer_of(p: Points, k: int, a: int, e: int) -> float:
-    """Return u_a by r_e at point k, where joints hold its bodies."""
-    total = 0.0
+def row_of(p: Points, k: int, side: int) -> int:
+    """Return the row in which what point k moves has one of its bodies, -1 for none."""
     for at in range(p.wide[k], p.wide[k] + p.near[k]):
-        for side in range(2):
-            if p.moved[at] == p.body[k, side]:
-                for c in range(6):
-                    total += direction(p, k, side, a, c) * p.moves[at, c, e]
+        if p.moved[at] == p.body[k, side]:
+            return at
+    return -1
+
+
+@jitable
+def answer_of(p: Points, k: int, a: int, e: int, rows: tuple[int, int]) -> float:
+    """Return u_a by r_e at point k, where joints hold its bodies, which have these rows."""
+    total = 0.0
+    for side in range(2):
+        at = rows[side]
+        if at >= 0:
+            for c in range(6):
+                total += direction(p, k, side, a, c) * p.moves[at, e, c]
     return total
 
 

@@ -31,7 +31,7 @@ from mbsim.stepping.arrays import (
     Stepping,
 )
 from mbsim.stepping.held import answer_listed, widen
-from mbsim.stepping.one_point import answer_of, fill_inverse, velocity_of
+from mbsim.stepping.one_point import answer_of, fill_inverse, row_of, velocity_of
 
 #: Part of a step's motion by which pairs are looked for beyond it: others may hit what moves.
 AHEAD = 0.5
@@ -217,14 +217,8 @@ def fill_answers(scene: Scene, S: Stepping) -> None:
     for k in range(S.tally.count[POINTS]):
         row = P.given[k]
         if P.wide[k] >= 0:
-            row[W_NN], row[W_NX], row[W_NZ] = (
-                answer_of(P, k, 0, 0),
-                answer_of(P, k, 0, 1),
-                answer_of(P, k, 0, 2),
-            )
-            row[W_XX], row[W_XZ], row[W_ZZ] = (
-                answer_of(P, k, 1, 1),
-                answer_of(P, k, 1, 2),
-                answer_of(P, k, 2, 2),
-            )
+            rows = row_of(P, k, 0), row_of(P, k, 1)
+            row[W_NN], row[W_NX] = answer_of(P, k, 0, 0, rows), answer_of(P, k, 0, 1, rows)
+            row[W_NZ], row[W_XX] = answer_of(P, k, 0, 2, rows), answer_of(P, k, 1, 1, rows)
+            row[W_XZ], row[W_ZZ] = answer_of(P, k, 1, 2, rows), answer_of(P, k, 2, 2, rows)
         fill_inverse(row)

@@ -7,7 +7,7 @@ equations take away what that would change of them, G dV = 0. All is as `hold` l
 from __future__ import annotations
 
 from mbsim.arrays.scene import Scene
-from mbsim.core.arrays import F1, F2, F3, V3, V6
+from mbsim.core.arrays import F1, F2, F3, I1, V3, V6
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, vector
 from mbsim.dynamics.constraints.equations import (
@@ -18,9 +18,7 @@ from mbsim.dynamics.constraints.equations import (
 )
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.projection import prepare_equations
-from mbsim.dynamics.constraints.tree import plus, respond, six
-
-NONE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+from mbsim.dynamics.constraints.tree import respond, six
 
 
 @jitable
@@ -59,136 +57,153 @@ def answer_tree(scene: Scene, wrench: F1) -> None:
 
 
 @jitable
-def keep_six(row: F1, a: V6) -> None:
-    """Write six numbers into a row."""
-    row[0], row[1], row[2], row[3], row[4], row[5] = a
+def add_impulse(scene: Scene, k: int, p: F2, column: int, push: V3, turn: V3) -> None:
+    """Add an impulse on the body at tree index k, about its cg, to a column of its forces p."""
+    turn = add(turn, cross(vector(scene.sweep.arm[k]), push))
+    for c in range(3):
+        p[c, column] -= turn[c]
+        p[3 + c, column] -= push[c]
 
 
 @jitable
-def clear_six(wrench: F2) -> None:
-    """Let six impulses on a body be none."""
-    for c in range(6):
-        keep_six(wrench[c], NONE)
+def take_along(left: F1, s: V6, x: F2) -> None:
+    """Take from numbers the products of a spatial vector with columns of x."""
+    for e in range(len(left)):
+        first = s[0] * x[0, e] + s[2] * x[2, e] + s[4] * x[4, e]
+        second = s[1] * x[1, e] + s[3] * x[3, e] + s[5] * x[5, e]
+        left[e] -= first + second
 
 
 @jitable
-def is_none(wrench: F2) -> bool:
-    """Return whether six impulses on a body are none."""
-    total = 0.0
-    for c in range(6):
-        row = wrench[c]
-        total += abs(row[0]) + abs(row[1]) + abs(row[2]) + abs(row[3]) + abs(row[4]) + abs(row[5])
-    return total == 0.0
+def add_along(x: F2, s: V6, part: F1) -> None:
+    """Add so many times a spatial vector to columns of x."""
+    for e in range(len(part)):
+        x[0, e] += s[0] * part[e]
+        x[1, e] += s[1] * part[e]
+        x[2, e] += s[2] * part[e]
+        x[3, e] += s[3] * part[e]
+        x[4, e] += s[4] * part[e]
+        x[5, e] += s[5] * part[e]
 
 
 @jitable
-def cross_row(r: V3, i: int, x: F2, at: int) -> V6:
-    """Return component i of r x v for six v, whose components are the rows of x from `at` on."""
-    a, b = (i + 1) % 3, (i + 2) % 3
-    return plus(plus(NONE, r[a], six(x[at + b])), -r[b], six(x[at + a]))
+def fill_columns(x: F2, others: F2) -> None:
+    """Let columns be others."""
+    for i in range(6):
+        row, other = x[i], others[i]
+        for e in range(len(row)):
+            row[e] = other[e]
 
 
 @jitable
-def load_six(scene: Scene, k: int, wrench: F3) -> None:
-    """Replace six impulses on the body at tree index k, about its cg, by forces p about O."""
-    w, r = wrench[scene.tree.body[k]], vector(scene.sweep.arm[k])
-    x, y, z = cross_row(r, 0, w, 0), cross_row(r, 1, w, 0), cross_row(r, 2, w, 0)
-    x, y, z = plus(x, 1.0, six(w[3])), plus(y, 1.0, six(w[4])), plus(z, 1.0, six(w[5]))
-    f, g, h = six(w[0]), six(w[1]), six(w[2])
-    keep_six(w[0], plus(NONE, -1.0, x))
-    keep_six(w[1], plus(NONE, -1.0, y))
-    keep_six(w[2], plus(NONE, -1.0, z))
-    keep_six(w[3], plus(NONE, -1.0, f))
-    keep_six(w[4], plus(NONE, -1.0, g))
-    keep_six(w[5], plus(NONE, -1.0, h))
+def add_columns(x: F2, others: F2) -> None:
+    """Add others to columns."""
+    for i in range(6):
+        row, other = x[i], others[i]
+        for e in range(len(row)):
+            row[e] += other[e]
 
 
 @jitable
-def pass_six_up(scene: Scene, k: int, wrench: F3, z: F3) -> None:
-    """Do what `pass_up` does for six forces at once."""
+def clear(row: F1) -> None:
+    """Let numbers be 0."""
+    for e in range(len(row)):
+        row[e] = 0.0
+
+
+@jitable
+def take_scaled(left: F1, factor: float, other: F1) -> None:
+    """Take so many times other numbers from numbers."""
+    for e in range(len(left)):
+        left[e] -= factor * other[e]
+
+
+@jitable
+def divide(row: F1, by: float) -> None:
+    """Divide numbers."""
+    part = 1.0 / by
+    for e in range(len(row)):
+        row[e] *= part
+
+
+@jitable
+def pass_columns_up(scene: Scene, k: int, forces: F3, shares: F3, loaded: I1) -> None:
+    """Do what `pass_up` does, for all columns of forces."""
     sweep, tree = scene.sweep, scene.tree
-    S, W, L, b = sweep.S[k], sweep.W[k], sweep.L[k], tree.body[k]
-    p, share, parent = wrench[b], z[b], tree.parent[k]
-    if is_none(p):
-        for q in range(tree.free[k]):
-            keep_six(share[q], NONE)
-        return
+    S, W, L, parent = sweep.S[k], sweep.W[k], sweep.L[k], tree.parent[k]
+    p, share = forces[k], shares[k]
     for q in range(tree.free[k]):
-        total = NONE
-        for i in range(6):
-            total = plus(total, -S[q, i], six(p[i]))
+        z = share[q]
+        clear(z)
+        take_along(z, six(S[q]), p)
         for j in range(q):
-            total = plus(total, -L[q, j], six(share[j]))
-        keep_six(share[q], plus(NONE, 1.0 / L[q, q], total))
-    if parent >= 0:
-        above = wrench[tree.body[parent]]
-        for i in range(6):
-            up = plus(six(above[i]), 1.0, six(p[i]))
-            for q in range(tree.free[k]):
-                up = plus(up, W[q, i], six(share[q]))
-            keep_six(above[i], up)
+            take_scaled(z, L[q, j], share[j])
+        divide(z, L[q, q])
+    if parent < 0:
+        return
+    above = forces[parent]
+    if loaded[parent] == 0:
+        loaded[parent] = 1
+        fill_columns(above, p)
+    else:
+        add_columns(above, p)
+    for q in range(tree.free[k]):
+        add_along(above, six(W[q]), share[q])
 
 
 @jitable
-def pass_six_down(scene: Scene, k: int, wrench: F3, z: F3) -> None:
-    """Do what `pass_down` does for six forces at once, in the place of these."""
+def pass_columns_down(scene: Scene, k: int, forces: F3, shares: F3, loaded: I1) -> None:
+    """Do what `pass_down` does, for all columns, in the place of the forces."""
     sweep, tree = scene.sweep, scene.tree
-    S, W, L, b, free = sweep.S[k], sweep.W[k], sweep.L[k], tree.body[k], tree.free[k]
-    a, share, parent = wrench[b], z[b], tree.parent[k]
-    for i in range(6):
-        keep_six(a[i], six(wrench[tree.body[parent], i]) if parent >= 0 else NONE)
+    S, W, L, parent, free = sweep.S[k], sweep.W[k], sweep.L[k], tree.parent[k], tree.free[k]
+    a, share = forces[k], shares[k]
     for q in range(free):
-        left = six(share[q])
-        for i in range(6):
-            left = plus(left, -W[q, i], six(a[i]))
-        keep_six(share[q], left)
+        if loaded[k] == 0:
+            clear(share[q])
+        if parent >= 0:
+            take_along(share[q], six(W[q]), forces[parent])
+    loaded[k] = 0
     for q in range(free - 1, -1, -1):
-        left = six(share[q])
         for j in range(q + 1, free):
-            left = plus(left, -L[j, q], six(share[j]))
-        keep_six(share[q], plus(NONE, 1.0 / L[q, q], left))
-    for i in range(6):
-        moved = six(a[i])
-        for q in range(free):
-            moved = plus(moved, S[q, i], six(share[q]))
-        keep_six(a[i], moved)
+            take_scaled(share[q], L[j, q], share[j])
+        divide(share[q], L[q, q])
+    if parent >= 0:
+        fill_columns(a, forces[parent])
+    else:
+        clear_columns(a)
+    for q in range(free):
+        add_along(a, six(S[q]), share[q])
 
 
 @jitable
-def unload_six(scene: Scene, k: int, wrench: F3) -> None:
-    """Replace six spatial velocities at tree index k by those of the body's cg, and of its spin."""
-    D, r = wrench[scene.tree.body[k]], vector(scene.sweep.arm[k])
-    # v = v_O + w x r
-    x, y, z = cross_row(r, 0, D, 0), cross_row(r, 1, D, 0), cross_row(r, 2, D, 0)
-    x, y, z = plus(six(D[3]), -1.0, x), plus(six(D[4]), -1.0, y), plus(six(D[5]), -1.0, z)
-    keep_six(D[3], six(D[0]))
-    keep_six(D[4], six(D[1]))
-    keep_six(D[5], six(D[2]))
-    keep_six(D[0], x)
-    keep_six(D[1], y)
-    keep_six(D[2], z)
+def answer_columns(scene: Scene, root: int, forces: F3, shares: F3, loaded: I1) -> None:
+    """Replace columns of forces p by the changes of spatial velocities, in the tree at `root`.
 
-
-@jitable
-def answer_six(scene: Scene, roots: tuple[int, int, int, int], wrench: F3, z: F3) -> None:
-    """Replace six impulses at once by the changes of velocities, in the trees with these roots.
-
-    `wrench` (nb, 6, 6) has components by impulses, force first, then velocity first; `z` is as
-    large and scratch. What is at other trees stays. No equations hold the bodies.
+    `forces` (nt, 6, AT_ONCE) are those of `add_impulse` where `loaded` (nt,) is 1, which is 0 again
+    behind this; `shares` is as large and scratch. No equations hold the bodies.
     """
-    tree, n = scene.tree, len(scene.tree.body)
-    for k in range(n):
-        if tree.root[k] in roots:
-            load_six(scene, k, wrench)
-    for k in range(n - 1, -1, -1):
-        if tree.root[k] in roots:
-            pass_six_up(scene, k, wrench, z)
-    for k in range(n):
-        if tree.root[k] in roots:
-            pass_six_down(scene, k, wrench, z)
-    for k in range(n):
-        if tree.root[k] in roots:
-            unload_six(scene, k, wrench)
+    end = scene.tree.end[root]
+    for k in range(end - 1, root - 1, -1):
+        if loaded[k] == 1:
+            pass_columns_up(scene, k, forces, shares, loaded)
+    for k in range(root, end):
+        pass_columns_down(scene, k, forces, shares, loaded)
+
+
+@jitable
+def clear_columns(p: F2) -> None:
+    """Let a body have no forces."""
+    for i in range(6):
+        clear(p[i])
+
+
+@jitable
+def write_column(scene: Scene, k: int, found: F2, column: int, change: F1) -> None:
+    """Write a column of `answer_columns` as the velocity of the body's cg, and its spin."""
+    r, spin = vector(scene.sweep.arm[k]), (found[0, column], found[1, column], found[2, column])
+    velocity = add((found[3, column], found[4, column], found[5, column]), cross(spin, r))
+    for c in range(3):
+        change[c], change[3 + c] = velocity[c], spin[c]
 
 
 @jitable
