@@ -217,7 +217,7 @@ def keep_answers(scene: Scene, S: Stepping, root: int, k: int, column: int) -> N
         if its == root:
             for a in range(3):
                 write_column(scene, at, S.motion.columns[at], column + a, moves[a])
-        elif first and its not in roots:
+        elif first and (its < 0 or its not in roots):
             side = 0 if b == i else 1
             for a in range(3):
                 for c in range(6):
