@@ -5,7 +5,9 @@ forms give a lower bound of the distance. Such a pair is moved ahead by no more 
 it, again and again, until it overlaps or the step is over (conservative advancement: B. Mirtich,
 Impulse-based Dynamic Simulation of Rigid Body Systems, Berkeley 1996, section 2.3). Where it
 overlaps its rows are contact points as of any other pair; their gaps are what the same motion
-leaves of them at the step's begin. So nothing passes through anything, however thin.
+leaves of them at the step's begin. So nothing passes through anything, however thin. Lines and
+faces that touch are pushed into each other by a little first: all their rows hold the bodies then,
+not only the one that a rounding lets touch.
 """
 
 from __future__ import annotations
@@ -19,15 +21,21 @@ from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.detection import measure_pair
 from mbsim.dynamics.contact.forces import sides
-from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT
+from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT
 from mbsim.stepping.arrays import Motion, Stepping
-from mbsim.stepping.points import deepest_of, is_point, put_place
+from mbsim.stepping.points import deepest_of, is_point, put_place, slop_of
 
 #: A pair goes ahead by this part of its whole motion at least, and so beyond where it touches.
 LEAST_PART = 0.01
 #: From where it touches it goes on by so much of the smaller shape, within the step: corners that
 #: come down a little later in it are points too.
 FURTHER = 0.02
+#: Where it touches, rows count that are so much of its thinnest side apart, or what a step may
+#: leave, but no more of that side than this: behind it another way out may be nearer.
+TOUCHES, THIN = 1e-3, 0.05
+#: Beside the row that carries most, one that carries less than this part is no point: where two
+#: lines cross by a rounding their ends hold them.
+LIGHT_PART = 0.01
 #: Motions that are looked at before impulses are known: of both bodies, and of either one alone,
 #: as what lies on something that is held, or is held by something.
 BOTH, ONLY_I, ONLY_J = range(3)
@@ -69,26 +77,56 @@ def fastest_point(scene: Scene, g: int, way: F1) -> float:
 
 @jitable
 def measure_ahead(scene: Scene, S: Stepping, y: F1, pair: int, t: float) -> float:
-    """Measure a pair after a time t of `M.way`; return its largest depth."""
+    """Measure a pair after a time t of `M.way`, pushed on by `M.push`; return its largest depth."""
     M = S.motion
     gi, gj = scene.pairs.graphic_i[pair], scene.pairs.graphic_j[pair]
     place_ahead(scene, y, gi, M.frames[0], M.way[0], t)
     place_ahead(scene, y, gj, M.frames[1], M.way[1], t)
+    for c in range(3):
+        scene.work.frames[gi, c] -= M.push[c]
     measure_pair(scene, pair)
     return deepest_of(scene, S, pair)
+
+
+@jitable
+def push_on(scene: Scene, S: Stepping, pair: int, way: float) -> None:
+    """Fill `M.push` of a measured pair: by how much less its first graphic is out of the other.
+
+    That is along the normal where it is deepest. The pair's order may be another one than that of
+    its rows.
+    """
+    first, deepest = scene.pairs.slot[pair], 0
+    for row in range(1, S.plan.rows[scene.pairs.kind[pair]]):
+        depth = scene.work.points[first + row, AT_DEPTH]
+        deepest = row if depth > scene.work.points[first + deepest, AT_DEPTH] else deepest
+    n = vector(scene.work.points[first + deepest, AT_NORMAL:])
+    gi, _ = sides(scene, first + deepest)
+    along = scale(way if gi == scene.pairs.graphic_i[pair] else -way, n)
+    for c in range(3):
+        S.motion.push[c] = along[c]
+
+
+@jitable
+def touching(scene: Scene, S: Stepping, gi: int, gj: int) -> float:
+    """Return how far apart rows of a pair may be where it touches."""
+    thin = 2.0 * min(scene.graphics.thin[gi], scene.graphics.thin[gj])
+    return min(max(slop_of(scene, S, gi, gj), TOUCHES * thin), THIN * thin)
 
 
 @jitable
 def find_touch(scene: Scene, S: Stepping, y: F1, pair: int, h: float, depth: float) -> float:
     """Return the time at which a pair overlaps first in a step h by `M.way`, -1 for never.
 
-    `depth` is its largest one now. Its rows are those of that time, or a little later.
+    `depth` is its largest one now. Its rows are those of that time, or a little later. Where it is
+    no deeper then than `touching`, they are those of the pair pushed on by so much: an end of a
+    line, or a corner of a face, that a rounding keeps from touching holds bodies as the others do.
     """
     gi, gj = scene.pairs.graphic_i[pair], scene.pairs.graphic_j[pair]
     a, b = S.motion.way[0], S.motion.way[1]
+    push_on(scene, S, pair, 0.0)
     speed = norm((a[0] - b[0], a[1] - b[1], a[2] - b[2]))
     speed += fastest_point(scene, gi, a) + fastest_point(scene, gj, b)
-    if not 0.0 < speed < math.inf:
+    if not speed < math.inf or (depth <= 0.0 and speed == 0.0):
         return -1.0
     t = 0.0
     while depth <= 0.0:
@@ -98,10 +136,23 @@ def find_touch(scene: Scene, S: Stepping, y: F1, pair: int, h: float, depth: flo
         if t > h:
             return -1.0
         depth = measure_ahead(scene, S, y, pair, t)
-    size = min(scene.graphics.radius[gi], scene.graphics.radius[gj])
-    later = min(h, t + FURTHER * size / speed)
-    if measure_ahead(scene, S, y, pair, later) > 0.0:
-        return later
+    most, later = touching(scene, S, gi, gj), t
+    push_on(scene, S, pair, max(most - depth, 0.0))
+    if speed > 0.0:
+        size = min(scene.graphics.radius[gi], scene.graphics.radius[gj])
+        later = min(h, t + FURTHER * size / speed)
+    if speed * (later - t) > most:
+        back = vector(S.motion.push)
+        push_on(scene, S, pair, 0.0)
+        depth = measure_ahead(scene, S, y, pair, later)
+        if depth > most:
+            return later
+        if depth > 0.0:
+            t = later
+            push_on(scene, S, pair, most - depth)
+        else:
+            for c in range(3):
+                S.motion.push[c] = back[c]
     measure_ahead(scene, S, y, pair, t)
     return t
 
@@ -119,16 +170,26 @@ def choose_way(scene: Scene, S: Stepping, pair: int, which: int) -> None:
 
 
 @jitable
+def heaviest(scene: Scene, S: Stepping, pair: int) -> float:
+    """Return the largest weight of the rows of a pair that overlaps."""
+    most, first = 0.0, scene.pairs.slot[pair]
+    for s in range(first, first + S.plan.rows[scene.pairs.kind[pair]]):
+        if scene.work.points[s, AT_DEPTH] > 0.0:
+            most = max(most, scene.work.points[s, AT_WEIGHT])
+    return most
+
+
+@jitable
 def add_ahead(scene: Scene, S: Stepping, y: F1, s: int, pair: int, t: float, apart: bool) -> bool:
     """Take row s, measured at time t of `M.way`, as a contact point; False if there is no room."""
     P, M, point = S.points, S.motion, scene.work.points[s]
-    if point[AT_DEPTH] <= 0.0 or not is_point(scene, pair, s):
-        return True
     gi, gj = sides(scene, s)
     k = put_place(scene, S, pair, s, gi, gj)
     if k < 0:
         return False
-    p, n = vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
+    n, push = vector(point[AT_NORMAL:]), vector(M.push)
+    # half way between both surfaces, where what is pushed is back
+    p = add(vector(point[AT_POINT:]), scale(0.5, push))
     closing = 0.0
     for side in range(2):
         g, b = (gi, P.body[k, 0]) if side == 0 else (gj, P.body[k, 1])
@@ -142,7 +203,9 @@ def add_ahead(scene: Scene, S: Stepping, y: F1, s: int, pair: int, t: float, apa
         for c in range(3):
             P.arm[k, side, c] = arm[c]
             P.point[k, c] = x[c] + arm[c]
+    pushed = dot(n, push)
     P.gap[k] = -point[AT_DEPTH] - t * closing
+    P.gap[k] += pushed if gi == scene.pairs.graphic_i[pair] else -pushed
     if apart:
         P.gap[k] = max(P.gap[k], 0.0)
     else:
@@ -153,10 +216,12 @@ def add_ahead(scene: Scene, S: Stepping, y: F1, s: int, pair: int, t: float, apa
 @jitable
 def take_ahead(scene: Scene, S: Stepping, y: F1, pair: int, t: float, apart: bool) -> bool:
     """Take what a pair has at time t of `M.way`, and put it back; False if there is no room."""
-    first, M = scene.pairs.slot[pair], S.motion
-    room = True
+    first, M, points = scene.pairs.slot[pair], S.motion, scene.work.points
+    room, least = True, LIGHT_PART * heaviest(scene, S, pair)
     for s in range(first, first + S.plan.rows[scene.pairs.kind[pair]]):
-        room = room and add_ahead(scene, S, y, s, pair, t, apart)
+        some = points[s, AT_DEPTH] > 0.0 and points[s, AT_WEIGHT] > least
+        if some and is_point(scene, pair, s):
+            room = room and add_ahead(scene, S, y, s, pair, t, apart)
     M.taken[pair] = M.taken[len(M.taken) - 1]
     return room
 

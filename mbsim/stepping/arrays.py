@@ -140,6 +140,7 @@ class Motion(NamedTuple):
     slope: F1  # (ny,) y'
     way: F2  # (2, 6) velocities of the bodies of a pair that is moved ahead
     frames: F2  # (2, 12) of its graphics at the step's begin
+    push: F1  # (3,) way back by which its first graphic is put into the other one there
     taken: I1  # (pairs + 1,) the try of a step in which a pair has points by that; last: this one
     measured: I1  # (pairs,) 1 + list of near pairs in which its rows were measured, 0: none
     impulse: F1  # (ny,) impulses on bodies, then what they change of velocities
@@ -374,6 +375,7 @@ def make(
         slope=numbers(ny),
         way=numbers(2, 6),
         frames=numbers(2, 12),
+        push=numbers(3),
         taken=whole(pairs + 1),
         measured=whole(pairs),
         impulse=numbers(ny),

@@ -251,6 +251,22 @@ def _is_patch(kind: Kind) -> bool:
     return kind.has_area and not kind.region
 
 
+#: Shapes that touch at one point whatever they lie on.
+_ROUND = ("SPHERE", "ELLIPSOID")
+
+
+def _rocking(system: System) -> list[str]:
+    """Return what is to be said of pairs that have one point where they may lie flat."""
+    said: dict[str, None] = {}
+    for kind in system.plans.kinds:
+        if kind.slots == 1 and kind.shape_i not in _ROUND and kind.shape_j not in _ROUND:
+            said[
+                f"Force_Contact[{kind.contact}]: {kind.shape_i} on {kind.shape_j} touches at one "
+                "point: what lies flat there is not kept from rocking"
+            ] = None
+    return list(said)
+
+
 def rigid_mechanism(system: System, fixed: bool, tol: float) -> Made:
     """Return a system as a problem that steps with rigid contacts of its own."""
     from mbsim.dynamics.pipeline import hooks as shared
@@ -271,6 +287,7 @@ def rigid_mechanism(system: System, fixed: bool, tol: float) -> Made:
                 "take AUTO"
             )
     found = Coefficients(system)
+    found.said += _rocking(system)
     depends = find_depends(scene)
     coupled = _changing_forces(scene, depends)
     nb = len(scene.bodies.mass)

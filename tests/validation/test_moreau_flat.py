@@ -1,0 +1,162 @@
+"""MOREAU: what lies on ends, sides and faces rests, and a train of cylinders stays in line.
+
+Bodies that a rounding tilts touch at one end of a line or at one corner. Held there alone they turn
+about it until the other end is deep: stacks toppled, and logs rolled apart.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+import mbsim
+from helpers import rigid_decks as decks
+from mbsim.bench import deck as text
+from mbsim.bench.scenes import s15_cylinder_train as train
+from mbsim.results.reading import Results
+
+#: Axes of a marker whose z is along global y, as a log lies.
+ALONG_Y = ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0))
+#: Half the width of what is stacked, and its height over that.
+HALF, HIGH = 0.1, {"disc": 0.02}
+
+
+def shape(folder: Path, kind: str, graphic: int, marker: int, size: float, height: float) -> str:
+    """Return a shape that stands on its marker; a prism's is in its middle."""
+    file = ""
+    if kind == "cylinder" or kind == "disc":
+        given = text.attributes(type="Cylinder", radius=size, length=height)
+    elif kind == "frustum":
+        sizes = {"bottom_radius": size, "top_radius": 0.8 * size, "length": height}
+        given = text.attributes(type="Frustum", **sizes)
+    elif kind == "box":
+        sizes = {"length_x": 2.0 * size, "length_y": 2.0 * size, "length_z": height}
+        given = text.attributes(type="BoxDefinedFromCenter", **sizes)
+    else:
+        prism = trimesh.creation.cylinder(radius=size, height=height, sections=6)
+        prism.export(folder / "prism.stl")
+        given, file = 'type="TriaMesh"', 'file="prism.stl"'
+    place = "rm_id" if kind == "prism" else "center_marker_id"
+    return f'<Post_Graphic id="{graphic}" {given} {place}="{marker}" {file}/>'
+
+
+def stack(folder: Path, kinds: list[str], scale: float, h: float) -> tuple[Results, float]:
+    """Return the run of a stack, each body a hundredth of its width beside the one below."""
+    parts, graphics, z = [], [], 0.0
+    for k, kind in enumerate(kinds):
+        number, size = 2 + k, scale * HALF
+        height = scale * HIGH.get(kind, HALF)
+        at = (0.02 * size * k, 0.0, z + height / 2.0)
+        turns = (size * size / 4.0 + height * height / 12.0,) * 2 + (size * size / 2.0,)
+        middle = kind in ("box", "prism")
+        foot = at if middle else (at[0], at[1], z)
+        parts += [
+            text.body(number, 1.0, turns, at),
+            text.marker(10 * number + 1, number, foot),
+            shape(folder, kind, 100 * number, 10 * number + 1, size, height),
+        ]
+        graphics.append(100 * number)
+        z += height
+    law = decks.rubbed(0.5)
+    parts += [text.contact(301, graphics, [100], **law)]
+    parts += [text.contact(302, graphics, graphics, **law), text.gravity()]
+    model = decks.model(folder, parts, 100.0 * h, h, h)
+    return mbsim.simulate(model, integrator="MOREAU", tol=1e-4), scale
+
+
+def moved(results: Results, count: int) -> float:
+    """Return how far the farthest body comes from where it was."""
+    places = [np.asarray(results[f"bodies/{2 + k}/position"]) for k in range(count)]
+    return max(float(np.abs(place - place[0]).max()) for place in places)
+
+
+@pytest.mark.parametrize(
+    "kinds",
+    [
+        ["cylinder"] * 6,
+        ["prism"] * 6,
+        ["frustum", "cylinder", "cylinder"],
+        ["cylinder", "box"] * 3,
+        ["box", "cylinder"] * 3,
+        ["prism", "box"] * 3,
+        ["disc"] * 6,
+    ],
+    ids="-".join,
+)
+@pytest.mark.parametrize("h", [1e-2, 5e-3])
+def test_a_stack_rests(tmp_path: Path, kinds: list[str], h: float) -> None:
+    results, scale = stack(tmp_path, kinds, 1.0, h)
+    assert moved(results, len(kinds)) < 2e-3 * HALF * scale
+    load = results["contacts/301/force"][-20:, 2].mean()
+    assert load == pytest.approx(len(kinds) * 9.81, rel=1e-2)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 100.0])
+def test_a_stack_of_any_size_rests(tmp_path: Path, scale: float) -> None:
+    results, _ = stack(
+        tmp_path, ["cylinder", "cylinder", "box", "cylinder"], scale, 1e-2 * math.sqrt(scale)
+    )
+    assert moved(results, 4) < 2e-3 * HALF * scale
+
+
+def test_a_pile_of_logs_rests(tmp_path: Path) -> None:
+    parts, graphics, radius, length = [], [], 0.1, 0.3
+    places = [(row, i) for row in range(4) for i in range(4 - row)]
+    for number, (row, i) in enumerate(places, 2):
+        x, z = (2 * i + row) * radius, radius * (1.0 + row * math.sqrt(3.0))
+        along, across = radius**2 / 2.0, radius**2 / 4.0 + length**2 / 12.0
+        size = text.attributes(type="Cylinder", radius=radius, length=length)
+        parts += [
+            text.body(number, 1.0, (across, along, across), (x, 0.0, z)),
+            text.marker(10 * number + 1, number, (x, -length / 2.0, z), ALONG_Y),
+            f'<Post_Graphic id="{100 * number}" center_marker_id="{10 * number + 1}" {size}/>',
+        ]
+        graphics.append(100 * number)
+    for marker, x, side in ((15, -radius, 1.0), (16, 7.0 * radius, -1.0)):
+        wall = ((0.0, 0.0, side), (0.0, 1.0, 0.0), (-side, 0.0, 0.0))
+        parts += [text.marker(marker, 1, (x, 0.0, 0.0), wall)]
+        parts += [f'<Post_Graphic id="{marker + 90}" type="Plane" rm_id="{marker}"/>']
+    law = decks.rubbed(0.5)
+    parts += [text.contact(301, graphics, [100, 105, 106], **law)]
+    parts += [text.contact(302, graphics, graphics, **law), text.gravity()]
+    model = decks.model(tmp_path, parts, 1.0, 1e-2, 1e-2)
+    results = mbsim.simulate(model, integrator="MOREAU", tol=1e-4)
+    assert moved(results, len(places)) < 1e-4 * radius
+
+
+@pytest.mark.parametrize("h", [1e-2, 5e-3, 2e-3])
+def test_a_train_of_cylinders_stays_in_line(h: float) -> None:
+    deck = train._deck({"h": h})
+    results = mbsim.simulate(deck, integrator="MOREAU", tol=1e-4)
+    for number in range(2, 12):
+        w, x, y, z = np.asarray(results[f"bodies/{number}/quaternion"]).T
+        across = np.hypot(2.0 * (x * y - w * z), 2.0 * (y * z + w * x))
+        assert across.max() < 5e-3
+
+
+@pytest.mark.parametrize(("h", "tol", "allowed"), [(2e-3, 1e-3, 5e-5), (None, 1e-5, 1e-5)])
+def test_a_cylinder_rolls_down_a_box(
+    tmp_path: Path, h: float | None, tol: float, allowed: float
+) -> None:
+    """A solid cylinder that rolls is accelerated by 2/3 of what pulls along the slope."""
+    radius, length, tilt = 0.1, 0.3, 0.2
+    along, across = radius**2 / 2.0, radius**2 / 4.0 + length**2 / 12.0
+    size = text.attributes(type="Cylinder", radius=radius, length=length)
+    sides = text.attributes(length_x=20.0, length_y=4.0, length_z=1.0)
+    parts = [
+        text.marker(15, 1, (0.0, 0.0, -0.5)),
+        f'<Post_Graphic id="105" type="BoxDefinedFromCenter" center_marker_id="15" {sides}/>',
+        text.body(2, 1.0, (across, along, across), (0.0, 0.0, radius)),
+        text.marker(21, 2, (0.0, -length / 2.0, radius), ALONG_Y),
+        f'<Post_Graphic id="200" center_marker_id="21" {size}/>',
+        text.contact(301, [200], [105], **decks.rubbed(0.5)),
+        text.gravity(9.81 * math.sin(tilt), -9.81 * math.cos(tilt)),
+    ]
+    results = mbsim.simulate(decks.model(tmp_path, parts, 1.0, h), integrator="MOREAU", tol=tol)
+    way = np.asarray(results["bodies/2/position"])[-1]
+    assert way[0] == pytest.approx(0.5 * 2.0 / 3.0 * 9.81 * math.sin(tilt), abs=allowed)
+    assert np.abs(way[1:] - (0.0, radius)).max() < 1e-7
