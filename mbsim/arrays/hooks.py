@@ -161,6 +161,7 @@ class Joints(IntEnum):
     HOLD = 14  # the same of velocities, behind CLOSE
     AIM = 15  # keep rates of what holds accelerations, at a step's begin
     ASK = 16  # keep the accelerations that it asks for, in a step's midst
+    RENEW = 17  # as KEEP, of steps that go through a fold like through any other position
 
 
 class Dry(IntEnum):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import AIMED_AT, AIMED_WORK, FOLD_POWER, OF_MOTIONS
+from mbsim.arrays.codes import AIMED_AT, AIMED_WORK, OF_MOTIONS
 from mbsim.arrays.hooks import Hook, Joints
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int
@@ -26,7 +26,6 @@ from mbsim.dynamics.bodies.acceleration import accelerate
 from mbsim.dynamics.bodies.configuration import turn
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.dynamics.constraints.equations import power_of_equations
-from mbsim.dynamics.constraints.folding import passes_fold
 from mbsim.dynamics.pipeline.evaluate import add_gravity
 from mbsim.stepping.arrays import THETA, WOKEN, Stepping
 from mbsim.stepping.displacements import move_bodies
@@ -55,7 +54,7 @@ def bring_to_end(scene: Scene, t: float, y: F1) -> int:
     Rates of motions change within a step: what its end takes of velocities is their work, too.
     """
     code, accumulator = bring_onto_joints(scene, t, y), scene.world.accumulators[OF_MOTIONS]
-    if accumulator >= 0 and not passes_fold(scene, t):
+    if accumulator >= 0:
         y[accumulator] += scene.sweep.aimed[AIMED_WORK]
     return code
 
@@ -130,9 +129,7 @@ def hold_by_joints(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> int:
             total += dy[at + AT_V + c] + dy[at + AT_W + c]
     accumulator = scene.world.accumulators[OF_MOTIONS]
     if accumulator >= 0:
-        passing = passes_fold(scene, t)
-        power = scene.sweep.quality[FOLD_POWER] if passing else power_of_equations(scene) / half
-        dy[accumulator] = power
+        dy[accumulator] = power_of_equations(scene) / half
     return code if code != 0 or math.isfinite(total) else Code.NOT_FINITE
 
 

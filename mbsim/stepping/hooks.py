@@ -135,7 +135,7 @@ def commit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     S = view(scene.world.hooks[Hook.STEPPING], Stepping)
     listings = scene.log.counters[LISTINGS]
     if scene.world.hooks[Hook.JOINTS] != 0:
-        code = call_int(scene.world.hooks[Hook.JOINTS], (scene, Joints.KEEP, t, a, a))
+        code = call_int(scene.world.hooks[Hook.JOINTS], (scene, Joints.RENEW, t, a, a))
         if code != 0:
             return -failure_or(scene, code)
     y = vector_at(a, scene.rows.y.shape[1])

@@ -135,6 +135,23 @@ def test_galpha_passes_folds(tmp_path):
         assert off < 2e-2
 
 
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_moreau_goes_through_folds_like_through_any_position(name, tmp_path):
+    """Nearest velocities are no larger there: nothing is released, and it stays of order 2."""
+    off = []
+    for h in (0.002, 0.001):
+        scene = MECHANISMS[name]()
+        scene[0].extra = f'<Param_Transient h_max="{h}" h_min="{h}"/>'
+        found, audit = error(scene, tmp_path, 1e-4, end=1.0, integrator="MOREAU")
+        off.append(found)
+        assert audit.warnings == ()
+    assert off[0] > 3.5 * off[1]
+    found, audit = error(MECHANISMS[name](), tmp_path, 1e-5, end=1.0, integrator="MOREAU")
+    assert found < 1e-4
+    assert audit.warnings == ()
+    assert "fold" not in audit.entries
+
+
 def test_a_driven_parallelogram_passes_folds_and_its_work_is_counted(tmp_path):
     """At a uniform rate its places are known, and the drive's work is what the weight takes."""
     scene, _, _, first, length = parallelogram(0.8, 1.1, (1.0, 1.4, 0.6), 0.8, speed=5.0)

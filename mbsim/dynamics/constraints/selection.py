@@ -259,24 +259,14 @@ def choose_better(scene: Scene, t: float, y: F1, least: float) -> None:
 
 
 @jitable
-def keep_selection(scene: Scene, t: float, y: F1) -> int:
-    """Choose anew where the choice has worn; return 0, or a code if implied equations fail.
-
-    Or LEFT where a fold was left behind: what was released does not hold exactly then.
-    """
+def renew_selection(scene: Scene, t: float, y: F1) -> int:
+    """Choose anew where the choice has worn; return 0, or a code if implied equations fail."""
     sweep, count = scene.sweep, active_count(scene)
     if count == 0:
         return 0
-    if sweep.quality[FOLDS] == 1.0:
-        return LEFT if leave_fold(scene, t) else 0
     least = sweep.quality[PIVOT]
     sweep.quality[NEAR_FOLD] = 1.0 if near_fold(scene) else 0.0
-    if least > sweep.quality[USUAL]:
-        sweep.quality[KEPT] = 0.0
-    else:
-        keep_accelerations(scene, t)
-    watch_fold(scene, t)
-    if sweep.quality[FOLDS] == 1.0 or count == len(scene.equations.active) - 1:
+    if count == len(scene.equations.active) - 1:
         return 0
     apart, worst = implied_residual(scene, t, y)
     if apart > _DOUBT or least < _WORN * sweep.quality[CHOSEN]:
@@ -285,3 +275,23 @@ def keep_selection(scene: Scene, t: float, y: F1) -> int:
         scene.work.diagnostics[AT_FAULT] = worst
         return Code.CONTRADICTION
     return 0
+
+
+@jitable
+def keep_selection(scene: Scene, t: float, y: F1) -> int:
+    """Do the same, and look out for folds; return 0, or a code if implied equations fail.
+
+    Or LEFT where a fold was left behind: what was released does not hold exactly then.
+    """
+    sweep = scene.sweep
+    if active_count(scene) == 0:
+        return 0
+    if sweep.quality[FOLDS] == 1.0:
+        return LEFT if leave_fold(scene, t) else 0
+    sweep.quality[NEAR_FOLD] = 1.0 if near_fold(scene) else 0.0
+    if sweep.quality[PIVOT] > sweep.quality[USUAL]:
+        sweep.quality[KEPT] = 0.0
+    else:
+        keep_accelerations(scene, t)
+    watch_fold(scene, t)
+    return 0 if sweep.quality[FOLDS] == 1.0 else renew_selection(scene, t, y)

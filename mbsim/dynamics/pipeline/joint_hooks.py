@@ -45,7 +45,14 @@ from mbsim.dynamics.constraints.projection import (
     speed_up,
 )
 from mbsim.dynamics.constraints.reactions import add_tree_reactions, fill_reactions, show_sticking
-from mbsim.dynamics.constraints.selection import LEFT, choose, fill_size, keep_selection, use_all
+from mbsim.dynamics.constraints.selection import (
+    LEFT,
+    choose,
+    fill_size,
+    keep_selection,
+    renew_selection,
+    use_all,
+)
 from mbsim.dynamics.constraints.tree import load, prepare, respond, write_accelerations
 from mbsim.dynamics.constraints.tree_projection import project_tree, project_tree_velocities
 from mbsim.dynamics.pipeline.audit import examine_equations, examine_fold
@@ -106,7 +113,7 @@ def return_to_equations(scene: Scene, t: float, y: F1) -> None:
 
 @jitable
 def serve_steps(scene: Scene, what: int, t: float, y: F1, dy: F1) -> int:
-    """Do what steps with impulses ask for; return 0."""
+    """Do what steps with impulses ask for; return 0 or a code."""
     if what == Joints.READY:
         make_ready(scene, t, y)
     elif what == Joints.IMPULSE:
@@ -117,6 +124,8 @@ def serve_steps(scene: Scene, what: int, t: float, y: F1, dy: F1) -> int:
         aim(scene, t, y)
     elif what == Joints.ASK:
         ask(scene, t, y)
+    elif what == Joints.RENEW:
+        return renew_selection(scene, t, y)
     else:
         hold_all_velocities(scene, t, y)
     return 0
@@ -127,7 +136,7 @@ def serve(scene: Scene, what: int, t: float, y: F1, dy: F1) -> int:
     """Do what joints are asked for (`Joints`); return 0 or a code."""
     if what == Joints.ACCELERATE:
         return constrain(scene, t, y, dy)
-    if Joints.READY <= what <= Joints.ASK:
+    if Joints.READY <= what <= Joints.RENEW:
         return serve_steps(scene, what, t, y, dy)
     if what == Joints.PROJECT_TREE:
         quality = scene.sweep.quality
