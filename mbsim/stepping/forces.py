@@ -96,6 +96,21 @@ def go_to_midst(scene: Scene, S: Stepping, h: float, y: F1) -> None:
 
 
 @jitable
+def look_on(scene: Scene, S: Stepping, y: F1, asked: F1) -> None:
+    """Fill the state in the midst of a step from y as motions by the state see it.
+
+    Velocities are those that the step was found to have there, not those of forces alone.
+    """
+    midst, middle, share = S.motion.midst, S.motion.middle, 0.5 / S.forces.number[THETA]
+    for k in range(len(midst)):
+        asked[k] = midst[k]
+    for k in range(len(scene.tree.body)):
+        at = BODY_SIZE * scene.tree.body[k]
+        for c in range(at + AT_V, at + BODY_SIZE):
+            asked[c] = y[c] + share * (middle[c] - y[c])
+
+
+@jitable
 def hold_by_joints(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> int:
     """Fill accelerations of bodies that joints hold in the step h from (t, y); return 0 or a code.
 
@@ -111,8 +126,9 @@ def hold_by_joints(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> int:
     """
     half, midst, dy = 0.5 * h, S.motion.midst, S.motion.slope
     go_to_midst(scene, S, h, y)
-    joints = scene.world.hooks[Hook.JOINTS]
-    code, total = call_int(joints, (scene, Joints.ASK, t + half, midst, dy)), 0.0
+    joints, asked, total = scene.world.hooks[Hook.JOINTS], S.motion.aside, 0.0
+    look_on(scene, S, y, asked)
+    code = call_int(joints, (scene, Joints.ASK, t + half, asked, dy))
     scene.sweep.aimed[AIMED_AT] = t + half
     if code == 0:
         code = call_int(joints, (scene, Joints.HOLD, t + half, midst, dy))
@@ -154,10 +170,14 @@ def find_forces_within(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> 
     Stiff forces are those of bodies as joints have them: what opens them would be a force.
     """
     M, theta, joints, code = S.motion, S.forces.number[THETA], scene.world.hooks[Hook.JOINTS], 0
+    when = t + theta * h
     if theta > 0.5 and joints != 0:
-        code = bring_onto_joints(scene, t + theta * h, M.middle)
+        code = bring_onto_joints(scene, when, M.middle)
     if code == 0:
-        code = find_forces(scene, t + theta * h, M.middle, M.slope)
+        code = find_forces(scene, when, M.middle, M.slope)
+    if code == 0 and joints != 0 and scene.world.hooks[Hook.REACTION_FORCES] != 0:
+        # forces by reactions are settled with the accelerations that joints leave
+        code = call_int(joints, (scene, Joints.ACCELERATE, when, M.middle, M.slope))
     if code == 0 and joints != 0:
         code = hold_by_joints(scene, S, t, h, y)
     return code

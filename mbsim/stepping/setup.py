@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from mbsim.arrays.codes import MULTI_POINT, OF_POINTS, POINTS, SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.codes import (
+    MULTI_POINT,
+    OF_POINTS,
+    POINTS,
+    ROW_OF,
+    SCALE_LENGTH,
+    SCALE_SPEED,
+)
 from mbsim.arrays.hooks import Hook
 from mbsim.compile_model.program_dependence import find_depends
 from mbsim.compile_model.tangent import MOST_BODIES
@@ -16,7 +23,9 @@ from mbsim.core.problem import Problem, addresses
 from mbsim.core.signature import FLOAT, INT, POINTER
 from mbsim.dynamics.linearization.stiffness import sides_of
 from mbsim.errors import ModelError
+from mbsim.forces.catalog import FORCES
 from mbsim.geometry.catalog import NEARS, PAIRS, REGION_ROWS
+from mbsim.model.names import element_name
 from mbsim.stepping.arrays import (
     ALL_ANSWERS,
     ALL_BODIES,
@@ -267,6 +276,19 @@ def _rocking(system: System) -> list[str]:
     return list(said)
 
 
+def _refuse_reactions(system: System) -> None:
+    """Raise if a force looks at reactions while there are contacts, whose impulses do not show."""
+    scene, model = system.scene, system.model
+    if len(scene.contacts.id) > 0 and len(scene.applied.by_reactions) > 0:
+        kind, number = system.applied[int(scene.applied.by_reactions[0, ROW_OF])]
+        name = element_name(model.file, FORCES[kind].statement, number)
+        raise ModelError(
+            f"{model.file}:{model.table(kind)[number].source.line}: {name}: integrator MOREAU "
+            "cannot run this: it looks at reactions, which do not have the impulses of contacts; "
+            "take AUTO"
+        )
+
+
 def rigid_mechanism(system: System, fixed: bool, tol: float) -> Made:
     """Return a system as a problem that steps with rigid contacts of its own."""
     from mbsim.dynamics.pipeline import hooks as shared
@@ -286,6 +308,7 @@ def rigid_mechanism(system: System, fixed: bool, tol: float) -> Made:
                 f"integrator MOREAU cannot run this: {kind.shape_i} on {kind.shape_j} {why}; "
                 "take AUTO"
             )
+    _refuse_reactions(system)
     found = Coefficients(system)
     found.said += _rocking(system)
     depends = find_depends(scene)
