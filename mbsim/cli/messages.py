@@ -16,8 +16,8 @@ _UNSEEN = re.compile(
 )
 
 
-#: File and line with which a message of a deck begins.
-_PLACE = re.compile(r"([^\n]+?\.\w+:\d+): (.*)", re.DOTALL)
+#: File and line with which a message of a deck begins; behind other words they are no beginning.
+_PLACE = re.compile(r"((?:[A-Za-z]:)?[^\n:]+\.\w+:\d+): (.*)", re.DOTALL)
 
 
 def printable(text: str) -> str:

@@ -5,15 +5,14 @@ Every design is a function of the study alone: its seed, and nothing of the mach
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mbsim.errors import ModelError
+from mbsim.studies.csv_file import read_csv
 from mbsim.studies.distributions import Numbers, Spread
 
 if TYPE_CHECKING:
@@ -116,40 +115,13 @@ def random(study: Study) -> Numbers:
 
 def table(study: Study) -> Numbers:
     """Return the rows of the study's CSV, whose first line names the parameters."""
-    file = study.csv
-    assert file is not None
-    columns, rows = _read_csv(file)
-    if twice := sorted({name for name in columns if columns.count(name) > 1}):
-        raise ModelError(f"{file}: columns that are there twice: {', '.join(twice)}")
-    if missing := sorted(study.spreads.keys() - set(columns)):
-        raise ModelError(f"{file}: no columns {', '.join(missing)}")
-    if extra := sorted(set(columns) - study.spreads.keys()):
-        raise ModelError(f"{file}: columns of no parameter: {', '.join(extra)}")
-    order = [columns.index(name) for name in study.spreads]
-    return np.array(rows, dtype=np.float64).reshape(-1, len(columns))[:, order]
-
-
-def _read_csv(file: Path) -> tuple[list[str], list[list[float]]]:
-    """Return names and rows of a CSV of numbers."""
-    try:
-        with file.open(newline="", encoding="utf-8-sig") as text:
-            lines = [line for line in csv.reader(text) if any(cell.strip() for cell in line)]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        why = getattr(error, "strerror", None) or error
-        raise ModelError(f"{file}: cannot be read: {why}") from None
-    if len(lines) < 2:
-        raise ModelError(f"{file}: needs a line of names and lines of numbers")
-    names = [cell.strip() for cell in lines[0]]
-    rows: list[list[float]] = []
-    for number, line in enumerate(lines[1:], 2):
-        try:
-            rows.append([float(cell) for cell in line])
-        except ValueError:
-            raise ModelError(f"{file}: row {number}: must be numbers") from None
-        if len(line) != len(names) or not all(map(math.isfinite, rows[-1])):
-            what = "a finite number" if len(names) == 1 else f"{len(names)} finite numbers"
-            raise ModelError(f"{file}: row {number}: must be {what}")
-    return names, rows
+    assert study.csv is not None
+    found = read_csv(study.csv, whole=True)
+    if missing := sorted(study.spreads.keys() - found.columns.keys()):
+        raise ModelError(f"{study.csv}: no columns {', '.join(missing)}")
+    if extra := sorted(found.columns.keys() - study.spreads.keys()):
+        raise ModelError(f"{study.csv}: columns of no parameter: {', '.join(extra)}")
+    return np.stack([found[name] for name in study.spreads], axis=1)
 
 
 def _spread(study: Study, points: Any) -> Numbers:

@@ -45,8 +45,22 @@ REDUCTIONS: dict[str, Callable[[Numbers, Numbers], float]] = {
     "time_of_max": lambda t, x: float(t[np.argmax(x)]),
     "time_of_min": lambda t, x: float(t[np.argmin(x)]),
 }
+#: Those of which a peak has no other value than its own.
+OF_A_PEAK = ("last", "max", "absmax")
 #: How far a row may be from the time that `at` names, as a part of the run.
 _AT = 1e-9
+
+
+def is_peak(signal: str) -> bool:
+    """Return whether a signal is a contact's largest value over all steps: one number a run."""
+    return "/peak_" in signal
+
+
+def no_curve(signal: str) -> str:
+    """Return what is said of a peak where a signal over time is asked for."""
+    rows = signal.replace("/peak_", "/")
+    rows += "/mag" if rows.endswith("/force") else ""
+    return f"{signal} is one number a run, the largest of all steps; over time it is {rows}"
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbsim.errors import ModelError
+from mbsim.studies.csv_file import read_csv
 from mbsim.studies.distributions import Numbers, Spread
-from mbsim.studies.outputs import Output
-from mbsim.studies.records import TIME, Asked, Record, read_asked, read_columns, read_record
+from mbsim.studies.outputs import Output, is_peak, no_curve
+from mbsim.studies.records import TIME, Asked, Record, read_asked, read_record
 from mbsim.studies.study import Case, Study, load_toml, read_options, read_paths
 
 if TYPE_CHECKING:
@@ -224,7 +225,7 @@ def read_problem(file: str | Path) -> Problem:
     unknowns = _unknowns(tables["parameters"], faults)
     asked = read_asked(tables["records"], path.parent, tables["parameters"], faults)
     shifts = {one.offset for one in asked if isinstance(one.offset, str)}
-    paths = read_paths(tables["parameters"], tables["set"], faults, shifts)
+    paths = read_paths(tables["parameters"], tables["set"], options, faults, shifts)
     if any(unknown.prior for unknown in unknowns) and any("sd" not in a.table for a in asked):
         faults.append("records: sd: needed where a parameter has a prior, to be weighed against it")
     study = Study(
@@ -355,10 +356,10 @@ def _with_records(
     for one in asked:
         if one.file not in files:
             try:
-                files[one.file] = read_columns(one.file)
+                files[one.file] = read_csv(one.file)
             except ModelError as error:
                 files[one.file] = None
-                faults.append(str(error))
+                faults += str(error).split("\n")
     checked = _checked(problem.study, values, faults)
     records: list[Record] = []
     for one in asked:
@@ -441,6 +442,8 @@ def _factors(one: Asked, model: Model, faults: list[str]) -> tuple[float, float,
     quantity, single = quantity_in(model, one.signal)
     if not single:
         faults.append(f"records.{one.name}.signal: {one.signal} is a vector: name one component")
+    if is_peak(one.signal):
+        faults.append(f"records.{one.name}.signal: {no_curve(one.signal)}")
     factors = []
     for key, measured in (("unit", quantity), ("time_unit", TIMES)):
         factor = 1.0

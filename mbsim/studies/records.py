@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from mbsim.errors import ModelError
+from mbsim.studies.csv_file import Columns
 from mbsim.studies.distributions import Numbers
 
 #: Keys of a record, and the types of their values.
@@ -31,8 +31,6 @@ _KEYS: dict[str, tuple[type, ...]] = {
 _NEEDED = ("file", "signal", "column")
 #: The column of times, beside those of the records: no record can be called so.
 TIME = "run time"
-#: Between cells of a CSV: the one that the line of names has most of.
-_DELIMITERS = ",;\t"
 #: The largest value of a record: squares of a million of them are added up.
 _LARGEST = 1e150
 #: Rows of a record: fewer say nothing, more are a mistake.
@@ -177,54 +175,16 @@ def read_asked(
     return found
 
 
-@dataclass
-class Columns:
-    """A CSV that was read: its columns by name, NaN where a cell is empty."""
-
-    file: Path
-    columns: dict[str, Numbers]
-
-    def __getitem__(self, name: str) -> Numbers:
-        if name not in self.columns:
-            raise KeyError(f"{self.file} has no column {name!r}; it has {', '.join(self.columns)}")
-        return self.columns[name]
-
-
-def read_columns(file: Path) -> Columns:
-    """Return the columns of a CSV; lines that begin with # are skipped.
-
-    Raises
-    ------
-    ModelError
-        If it cannot be read, or a cell is no number.
-    """
-    try:
-        text = file.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        why = getattr(error, "strerror", None) or error
-        raise ModelError(f"{file}: cannot be read: {why}") from None
-    lines = [
-        (number, line)
-        for number, line in enumerate(text.splitlines(), 1)
-        if line.strip() and not line.lstrip().startswith("#")
+def _back_in_time(t: Numbers, lines: Numbers, name: str, per_time: float) -> list[str]:
+    """Return where times do not grow from row to row, by the first line of the file that is so."""
+    back = np.flatnonzero(np.diff(t) <= 0.0)
+    if not len(back):
+        return []
+    k, before = int(back[0]) + 1, t[back[0]] / per_time
+    return [
+        f"line {int(lines[k])}: {name} = {t[k] / per_time:.9g} follows {before:.9g}: "
+        "times must grow from row to row"
     ]
-    if len(lines) < 2:
-        raise ModelError(f"{file}: needs a line of names and lines of numbers")
-    delimiter = max(_DELIMITERS, key=lines[0][1].count)
-    names = [cell.strip() for cell in next(csv.reader([lines[0][1]], delimiter=delimiter))]
-    if twice := sorted({name for name in names if name and names.count(name) > 1}):
-        raise ModelError(f"{file}: columns that are there twice: {', '.join(twice)}")
-    rows: list[list[float]] = []
-    for number, line in lines[1:]:
-        cells = next(csv.reader([line], delimiter=delimiter))
-        try:
-            rows.append([float(cell) if cell.strip() else math.nan for cell in cells])
-        except ValueError:
-            raise ModelError(f"{file}:{number}: must be numbers: {line.strip()[:60]!r}") from None
-        if len(cells) != len(names):
-            raise ModelError(f"{file}:{number}: has {len(cells)} cells, not {len(names)}")
-    table = np.array(rows, dtype=np.float64)
-    return Columns(file, {name: table[:, k] for k, name in enumerate(names)})
 
 
 def _too_large(asked: Asked, x: Numbers, sd: Numbers | None) -> list[str]:
@@ -277,8 +237,8 @@ def read_record(asked: Asked, columns: Columns, factor: float, per_time: float) 
     count = int(kept.sum())
     if not _LEAST_ROWS <= count <= _MOST_ROWS:
         faults.append(f"{count} rows of {len(t)} are of use; from {_LEAST_ROWS} to {_MOST_ROWS}")
-    elif np.any(np.diff(t[kept]) <= 0.0):
-        faults.append("times must grow from row to row")
+    else:
+        faults += _back_in_time(t[kept], columns.lines[kept], wanted["time"], per_time)
     if sd is not None and not np.all(sd[kept] > 0.0):
         faults.append(f"sd: {table['sd']}: must be above 0 in every row")
     else:

@@ -36,6 +36,14 @@ _RUN: dict[str, tuple[type, ...]] = {
     "scripts": (bool,),
     "most_evaluations": (int,),
 }
+#: Attributes that an option of [run] stands in for, by their names folded; with an index the first
+#: two are of one Simulate of several, which the option may leave as it is.
+_STOOD_IN_FOR = {
+    "simulate.endtime": "end_time",
+    "simulate.printinterval": "print_interval",
+    "paramtransient.integrtol": "tol",
+    "paramtransient.integratortype": "integrator",
+}
 _NAME = re.compile(r"[A-Za-z_]\w*")
 _BRACES = re.compile(r"\{([^{}]*)\}")
 #: What columns of the table are called that are neither parameters nor outputs.
@@ -174,7 +182,7 @@ def read_study(file: str | Path) -> Study:
     about = _about(tables["study"], len(tables["parameters"]), path, faults)
     options = read_options(tables["run"], path, faults)
     spreads = _spreads(tables["parameters"], about["design"] != "csv", faults)
-    paths = read_paths(tables["parameters"], tables["set"], faults)
+    paths = read_paths(tables["parameters"], tables["set"], options, faults)
     outputs = _outputs(tables["outputs"], spreads, faults)
     if faults:
         raise ModelError("\n".join(f"{path}: {fault}" for fault in faults))
@@ -182,7 +190,8 @@ def read_study(file: str | Path) -> Study:
     try:
         count = len(study.points)
     except ModelError as error:
-        raise ModelError(f"{path}: {error}") from None
+        at = "" if study.csv is not None and str(error).startswith(f"{study.csv}:") else f"{path}: "
+        raise ModelError(f"{at}{error}") from None
     if beyond := [run for run in study.keep if not 0 <= run < count]:
         raise ModelError(f"{path}: study.keep: no run {beyond[0]}; runs are 0 to {count - 1}")
     return study
@@ -277,15 +286,22 @@ def _spreads(tables: Mapping[str, Any], needed: bool, faults: list[str]) -> dict
     return spreads
 
 
+def key_of(path: str, text: str, parameters: Collection[str]) -> str:
+    """Return the key of a study that changes an attribute, `text` being what it is set to."""
+    return f"parameters.{text[1:-1]}.path" if text[1:-1] in parameters else "set"
+
+
 def read_paths(
     tables: Mapping[str, Any],
     given: Mapping[str, Any],
+    options: Mapping[str, Any],
     faults: list[str],
     elsewhere: Collection[str] = (),
 ) -> dict[str, str]:
     """Return what parameters and [set] change in the deck, as `Study.paths`.
 
-    `elsewhere` names parameters that change something else; what is wrong is added to `faults`.
+    `options` are those of [run], `elsewhere` names parameters that change something else; what is
+    wrong is added to `faults`.
     """
     from mbsim.reader.keywords import fold
 
@@ -322,6 +338,11 @@ def read_paths(
             faults.append(f"set.{each}: {error}")
             continue
         used |= {name for part in parts if isinstance(part, Formula) for name in part.names}
+    faults += [
+        f"{key_of(each, text, tables)}: {each}: run.{option} stands in for it; leave one out"
+        for each, text in paths.items()
+        if (option := _STOOD_IN_FOR.get(fold(each))) in options
+    ]
     faults += [
         f"parameters.{name}: changes nothing: it has no path, and no [set] names it"
         for name in tables

@@ -16,8 +16,10 @@ from mbsim.errors import DeckError, Interrupted, ModelError, ResultsError, Solve
 from mbsim.results.files import replace_text
 from mbsim.studies.journal import Journal, rows_kept
 from mbsim.studies.local import Workers
+from mbsim.studies.outputs import OF_A_PEAK, is_peak, no_curve
 from mbsim.studies.sizes import output_sizes
 from mbsim.studies.stopping import number_of
+from mbsim.studies.study import key_of
 from mbsim.studies.table import SUFFIX, Responses, need_pyarrow, write_table
 from mbsim.studies.uncertainty import SUFFIX as UNCERTAINTY
 from mbsim.studies.uncertainty import need_salib, uncertainty
@@ -220,7 +222,8 @@ def described(study: Study) -> tuple[str, Mapping[str, float]]:
             raise
         said = (f"{study.file}: {by_key(study, line)}" for line in lines)
         raise ModelError("\n".join(said)) from None
-    if faults := [*check_signals(study, system, "outputs:"), *_vectors(study, system)]:
+    faults = [*check_signals(study, system, "outputs:"), *_vectors(study, system), *_peaks(study)]
+    if faults:
         raise ModelError("\n".join(f"{study.file}: {line}" for line in faults))
     facts: dict[str, Any] = Identity(system).facts
     # without what differs from run to run, so that a study that grows keeps its rows
@@ -289,14 +292,20 @@ def _vectors(study: Study, system: System) -> list[str]:
     ]
 
 
+def _peaks(study: Study) -> list[str]:
+    """Return which outputs ask for rows of what is one number a run, a line each."""
+    return [
+        f"outputs.{output.name}: {output.reduce}: {no_curve(output.signal)}"
+        for output in study.outputs
+        if is_peak(output.signal) and output.reduce not in OF_A_PEAK
+    ]
+
+
 def by_key(study: Study, line: str) -> str:
     """Return what is wrong with the deck, with the key of the study that it follows from."""
     for path, text in study.paths.items():
         if line.startswith(f"--set {path}="):
-            said = line.partition(": ")[2]
-            name = text[1:-1]
-            key = f"parameters.{name}.path" if name in study.spreads else "set"
-            return f"{key}: {path}: {said}"
+            return f"{key_of(path, text, study.spreads)}: {path}: {line.partition(': ')[2]}"
     return line
 
 

@@ -323,7 +323,7 @@ def test_all_that_is_wrong_is_said_at_once(tmp_path):
         (("sd = 1", "sd = 1\nfrom = 5"), "0 rows of 11 are of use"),
         (("sd = 1", ""), "records: sd: needed where a parameter has a prior"),
         (("bodies/2/position/x", "bodies/2/position"), "is a vector: name one component"),
-        (("none.csv", "bad.csv"), "bad.csv:3: must be numbers"),
+        (("none.csv", "bad.csv"), "bad.csv:3: x = 'one': must be a number"),
         (("none.csv", "back.csv"), "times must grow from row to row"),
         ((BELT.name, "none.xml"), "none.xml: no such file"),
     ],
