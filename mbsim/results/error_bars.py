@@ -26,6 +26,9 @@ FLOOR = 1e-9
 #: Of the range of positions: from where they are off by more, results are unsure, and not
 #: reproducible.
 UNSURE, LOST = 0.03, 0.10
+#: Positions that range over less than so many errors of a step are those of what rests: that they
+#: are off by a part of it says nothing.
+RESTS = 100.0
 #: Rows of two runs are at one time if they differ by less than this, relative.
 _SAME_TIME = 1e-9
 #: Columns of a request that are one vector each: with its magnitude.
@@ -207,6 +210,7 @@ def make(
     others: Sequence[Any],
     peaks: Mapping[str, Array],
     notes: Sequence[str] = (),
+    step_error: float = 0.0,
 ) -> Bars:
     """Return the error bars of a run.
 
@@ -222,6 +226,8 @@ def make(
         Bars of largest values, by dataset.
     notes : sequence of str
         What is to be said first.
+    step_error : float
+        What positions may be off by in a step [L].
     """
     time = held["time"]
     window, scales = windows_of(time), _scales(held)
@@ -233,7 +239,7 @@ def make(
         most = np.fmax.reduce([one[name] for one in apart])
         bar, kind = widened(most, window), _kind(name)
         if name == "bodies/position":
-            sure, lost = horizons(time, bar, scales[kind])
+            sure, lost = horizons(time, bar, max(scales[kind], RESTS * step_error))
             ends = np.flatnonzero(np.isinf(bar).any(axis=1))
             if len(ends):
                 lines.append(f"unverified from time {time[ends[0]]:.6g} on")

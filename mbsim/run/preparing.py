@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from mbsim import __version__
+from mbsim.arrays.codes import SCALE_LENGTH
 from mbsim.core.profile import part
 from mbsim.errors import ModelError
 from mbsim.model.elements import Model
@@ -163,6 +164,7 @@ def _attributes(
         "integrator": settings.integrator,
         "tol": settings.tol,
         "tol_from": settings.tolerances,
+        "length": float(system.scene.world.scale[SCALE_LENGTH]),
         "end_time": settings.end_time,
         "print_interval": settings.stages[-1].simulation.print_interval,
         "detector": detector,

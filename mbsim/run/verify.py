@@ -58,6 +58,8 @@ class Reruns:
         self.held = over_time(results)
         self.events, self.peaks = results["events"], _peaks(results)
         self.stats, self.integrator = results.stats, str(results.attributes["integrator"])
+        about = results.attributes
+        self.step_error = float(about["tol"]) * float(about["length"])
         self.apart: list[dict[str, Any]] = []
         self.others: list[Any] = []
         self.off_peaks: dict[str, Any] = {}
@@ -121,9 +123,8 @@ class Reruns:
 
     def bars(self) -> Bars:
         """Return the bars that the reruns give."""
-        return error_bars.make(
-            self.held, self.apart, self.events, self.others, self.off_peaks, self.lines
-        )
+        tables = self.held, self.apart, self.events, self.others, self.off_peaks
+        return error_bars.make(*tables, self.lines, self.step_error)
 
 
 def _peaks(results: Results) -> dict[str, Any]:

@@ -92,6 +92,18 @@ def test_positions_off_by_a_tenth_are_the_horizon():
     assert error_bars.horizons(time, off, 100.0) == (math.inf, math.inf)
 
 
+@pytest.mark.parametrize("steps", [{"integrator": "MOREAU"}, {}])
+def test_what_rests_is_not_called_irreproducible(steps):
+    """Positions that move by less than steps may be off, and other runs otherwise, are sure."""
+    said = []
+    deck = MODELS / "rigid" / "block_holds.xml"
+    run = mbsim.simulate(deck, end_time=2.0, verify=True, notify=said.append, **steps)
+    assert run.errors.reproducible_until("bodies/2/position") == math.inf
+    assert not [line for line in said if "unsure" in line or "reproducible" in line]
+    moved = np.ptp(run["bodies/2/position"], axis=0).max()
+    assert moved < 1e-3 * run.attributes["length"]
+
+
 def test_events_are_held_against_those_of_their_kind_in_their_order():
     kind = [("time", float), ("kind", "U8"), ("element", int)]
     run = np.array([(0.1, "touch", 1), (0.2, "leave", 1), (0.5, "touch", 1)], dtype=kind)
