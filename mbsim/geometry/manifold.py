@@ -14,8 +14,8 @@ import math
 
 from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import add, cross, dot, norm, scale, sub
-from mbsim.geometry.catalog import AT_DEPTH, AT_WEIGHT, put_point
+from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
+from mbsim.geometry.catalog import AT_DEPTH, AT_POINT, AT_WEIGHT, put_point
 
 #: Centre, u, v, radius, depth at the centre, rise of the depth along u.
 Disc = tuple[V3, V3, V3, float, float, float]
@@ -189,6 +189,16 @@ def line_lies(depth_a: float, depth_b: float, f: float) -> float:
 def side_faces(n: V3, out: V3) -> float:
     """Return the part that a side of normal `out` carries along n: none where its rim presses."""
     return fade(1.0 - 10.0 * norm(add(n, out)))
+
+
+@jitable
+def deepest_place(points: F2, count: int, p: V3, least: float) -> V3:
+    """Return the place of the deepest of the first `count` rows; p if all are less deep."""
+    for row in range(count):
+        if points[row, AT_DEPTH] > least:
+            least = points[row, AT_DEPTH]
+            p = vector(points[row, AT_POINT:])
+    return p
 
 
 @jitable

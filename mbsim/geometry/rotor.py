@@ -9,6 +9,10 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, any_tangent, cross, dot, norm, scale, sub
 from mbsim.geometry.convex import Shape, slant
 
+#: Over the larger radius: what is so near to a solid lies in it; how far above what touches a row
+#: may be that says where that is.
+ROUNDING, NEARLY = 1e-9, 0.1
+
 
 @jitable
 def end_facing(shape: Shape, d: V3) -> int:
@@ -71,3 +75,14 @@ def pointed(shape: Shape, d: V3) -> float:
 def widest(size: V3) -> float:
     """Return the larger radius."""
     return max(size[0], size[1])
+
+
+@jitable
+def lies_in(shape: Shape, p: V3, room: float) -> bool:
+    """Return whether p lies in a solid, or no farther outside than `room`."""
+    _, centre, _, _, a, size = shape
+    d = sub(p, centre)
+    z = dot(d, a)
+    part = min(1.0, max(0.0, 0.5 + 0.5 * z / size[2]))
+    radius = size[0] + part * (size[1] - size[0])
+    return abs(z) <= size[2] + room and norm(sub(d, scale(z, a))) <= radius + room

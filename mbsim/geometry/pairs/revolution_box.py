@@ -25,6 +25,7 @@ from mbsim.geometry.manifold import (
     TURN,
     Disc,
     crossing_of,
+    deepest_place,
     disc_lies,
     line_lies,
     line_weight,
@@ -39,8 +40,11 @@ from mbsim.geometry.manifold import (
 from mbsim.geometry.pairs.revolution import cylinder_size
 from mbsim.geometry.region import cylinder_on_rectangle, disc_on_rectangle
 from mbsim.geometry.rotor import (
+    NEARLY,
+    ROUNDING,
     end_disc,
     end_facing,
+    lies_in,
     pointed,
     side_distance,
     side_line,
@@ -382,8 +386,22 @@ def solid_on_box(i: Shape, j: Shape, points: F2) -> int:
         e = scale(j[5][axes[2]], edge_axis(j, axes[2]))
         part = segment_on_disc(points, 0, sub(q, e), add(q, e), (centre, r), o, n, 1.0, f)
     p = middle_of_one(i, j, axes, n, f)
+    # all of a face, a side or an end is farthest, but for rounding: not there if none is over it
+    room = f + ROUNDING * widest(i[5])
+    if not (lies_in(i, p, room) and lies_in_box(j, p, room)):
+        p = deepest_place(points, BOX_ROWS - 1, p, -NEARLY * widest(i[5]))
     share_with_one(points, BOX_ROWS - 1, part, crossed, f, p, n)
     return BOX_ROWS
+
+
+@jitable
+def lies_in_box(j: Shape, p: V3, room: float) -> bool:
+    """Return whether p lies in a box, or no farther outside than `room`."""
+    d = sub(p, j[1])
+    for k in range(3):
+        if abs(dot(d, edge_axis(j, k))) > j[5][k] + room:
+            return False
+    return True
 
 
 @jitable

@@ -25,6 +25,7 @@ from mbsim.geometry.manifold import (
     ARC_ROWS,
     TURN,
     crossing_of,
+    deepest_place,
     disc_lies,
     fade,
     line_weight,
@@ -36,7 +37,17 @@ from mbsim.geometry.manifold import (
     turn_of,
 )
 from mbsim.geometry.pairs.revolution import cylinder_size
-from mbsim.geometry.rotor import end_disc, end_facing, pointed, side_distance, side_line, widest
+from mbsim.geometry.rotor import (
+    NEARLY,
+    ROUNDING,
+    end_disc,
+    end_facing,
+    lies_in,
+    pointed,
+    side_distance,
+    side_line,
+    widest,
+)
 
 #: Rows: 6 for each rim, 2 where the rims cross; of a line its two ends and a crossing; one point.
 PAIR_ROWS = 2 * ARC_ROWS + 3
@@ -333,6 +344,9 @@ def solid_on_solid(i: Shape, j: Shape, points: F2) -> int:
     rim_i = pointed(i, scale(-1.0, n)) > pointed(j, n)
     low, high = far(i, scale(-1.0, n)), far(j, n)
     p = add(low, scale(0.5 * f, n)) if rim_i else sub(high, scale(0.5 * f, n))
+    room = f + ROUNDING * min(widest(i[5]), widest(j[5]))
+    if not (lies_in(i, p, room) and lies_in(j, p, room)):
+        p = deepest_place(points, PAIR_ROWS - 1, p, -NEARLY * widest(i[5]))
     share_with_one(points, PAIR_ROWS - 1, part, end_i == 0 and end_j == 0, f, p, n)
     return PAIR_ROWS
 
