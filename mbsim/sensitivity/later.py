@@ -19,6 +19,7 @@ from mbsim.dynamics.contact.forces import DEPTH
 from mbsim.integrators.scheme import Method, in_workspace
 from mbsim.sensitivity.along import LOWER, POINT, UPPER, point_at
 from mbsim.sensitivity.arrays import (
+    F_BEFORE,
     LAST_ON,
     LAST_UNTIL,
     REMEMBERED,
@@ -56,13 +57,10 @@ def is_steady(V: Variations, scene: Scene, m: Method, t: float, h: float) -> boo
             w[POINT, i] = m.trial[i]
         set_parameter(V, twin, scene, 0, 0.0)
         if steady:
-            code = call_int(p.rhs, (p.context, t + h, h, w[POINT], w[UPPER]))
-            code = code or call_int(
-                p.rhs, (p.context, t + h - OTHER_TIME * h, h, w[POINT], w[LOWER])
-            )
-            steady = code == 0
+            at = t + h - OTHER_TIME * h
+            steady = call_int(p.rhs, (p.context, at, h, w[POINT], w[LOWER])) == 0
             for i in range(len(m.y)):
-                steady = steady and w[UPPER, i] == w[LOWER, i]
+                steady = steady and V.jump[F_BEFORE, i] == w[LOWER, i]
         V.words[STEADY] = 1 if steady else 0
     return V.words[STEADY] == 1
 
