@@ -40,7 +40,12 @@ PLAIN, FOLLOWED = 26, 27
 # the kept point, plus 1, whose memories of laws the twin has in place of the committed ones, or 0;
 # whether the last part of a stick was gone over again
 AGAIN, GONE_OVER = 28, 29
-WORDS = 30
+# where the linearisations of the run and of the twin are; whether the twin's own is that of the
+# step that is taken
+RUN_TANGENT, OWN_TANGENT, LINEARISED = range(30, 33)
+# whether depths of contacts change in the step that is taken, as in impacts
+COLLIDES = 33
+WORDS = 34
 #: Rows of `Variations.far` and `depth`: either side of a difference, and the run itself.
 UP_SIDE, DOWN_SIDE, OWN = range(3)
 #: Rows of `Variations.jump`: y before the commit, f before and behind it; y and f of the straight
@@ -93,6 +98,9 @@ class Variations(NamedTuple):
     error: tags.Scratch[F1]  # (P,) of the last step, over the derivative
     enough: tags.Constant[F1]  # (2,) how large that may be; LEFT
     rate: F1  # (P,) how much smaller corrections of an implicit method's stages got, one by one
+    stale: I1  # (P,) 1 where the run's linearisation was too old for it in the last step
+    bend: F2  # (P, n) h^4 times the fourth derivative in time of D in the last step
+    bend_known: I1  # (P,) 1 where that is known
     bends: I1  # (P,) 1 where the last step was taken along the motion
     bent: I1  # (P,) how many steps in a row were
     jump: tags.Scratch[F2]  # (5, n) see BEFORE

@@ -20,10 +20,13 @@ from mbsim.integrators.positions import put_along
 from mbsim.integrators.radau5 import G0, G_IM, G_RE, TI, C, T
 from mbsim.integrators.radau5 import E as ERROR
 from mbsim.integrators.radau5 import Z as STAGES_AT
-from mbsim.integrators.scheme import FRESH, LAST_STEP, Method, in_workspace
+from mbsim.integrators.scheme import LAST_STEP, Method, in_workspace
 from mbsim.sensitivity.arrays import (
+    COLLIDES,
+    DOWN_SIDE,
     JOINTS,
     LEFT,
+    LINEARISED,
     OWN,
     PLAIN,
     REMEMBERED,
@@ -32,6 +35,8 @@ from mbsim.sensitivity.arrays import (
     UP_SIDE,
     Variations,
 )
+from mbsim.sensitivity.linearised import begin_step, linearise, take_systems
+from mbsim.sensitivity.predictor import goes_on, note_bend, predict
 from mbsim.sensitivity.twin import (
     half_step,
     keep_change,
@@ -48,38 +53,24 @@ from mbsim.sensitivity.twin import (
 Z, F, REAL, REAL_D, PAIR, PAIR_D, POINT, SLOPE = 0, 3, 6, 7, 8, 10, 12, 13
 KEPT = 14
 STAGES = 17
+#: The stage at which the twin is linearised.
+MIDDLE = 1
 #: By how much the error of order 3 overrates that of the step.
 OVERRATED = 100.0
 #: What an iteration may leave is less by this while bodies collide: forces turn what is left of
-#: places into speeds.
-IN_IMPACT = 0.02
-#: The iteration fails after so many, and where a correction is more than SLOW of that before: the
-#: linearisation is that of other forces.
-MOST, SLOW = 12, 0.5
+#: places into speeds. That is while a depth changes by more than such a part of it.
+IN_IMPACT, COLLIDING = 0.02, 1e-6
+#: Where a correction is more than POOR of that before, the twin is linearised in the step itself.
+#: The iteration fails after so many, and where a correction is more than SLOW of that before even
+#: then: the linearisation is that of other forces.
+POOR, MOST, SLOW = 0.1, 12, 0.5
 #: How fast corrections get smaller is trusted less from step to step while one is all there is
-#: (Hairer and Wanner, section IV.8).
-FORGET, LEAST_RATE = 0.8, 1e-6
+#: (Hairer and Wanner, section IV.8), the less where there are contacts, whose forces bend; what it
+#: is with another linearisation is not known.
+FORGET, FORGET_OF_CONTACTS, LEAST_RATE, UNKNOWN = 0.9, 0.8, 1e-6, 0.1
 #: Corrections that get no smaller are rounding where they are less than so much of y in sides of a
 #: difference.
 ROUNDING = 4e-15
-
-
-@jitable
-def goes_on(m: Method, h: float) -> bool:
-    """Return whether the last step's polynomials say something of a step h from its end."""
-    return m.memory[FRESH] == 0.0 and m.memory[LAST_STEP] > 0.0 and h < 10.0 * m.memory[LAST_STEP]
-
-
-@jitable
-def extrapolate(V: Variations, m: Method, h: float, k: int) -> None:
-    """Begin with stages where the last step's polynomial, carried on, has them."""
-    z, d = V.stage[Z : Z + 3], V.dense[k]
-    known = goes_on(m, h)
-    for j in range(3):
-        s = 1.0 + C[j] * h / m.memory[LAST_STEP] if known else 0.0
-        for i in range(len(m.y)):
-            inner = d[2, i] + s * d[3, i]
-            z[j, i] = s * (d[1, i] + (1.0 - s) * inner) - d[1, i] if known else 0.0
 
 
 @jitable
@@ -91,21 +82,55 @@ def point_beside(V: Variations, m: Method, k: int, j: int, e: float) -> None:
 
 
 @jitable
+def depths_change(V: Variations) -> bool:
+    """Return whether contacts get deeper or less deep from stage to stage, whose depths are kept.
+
+    At the deepest point of an impact two of them may be alike.
+    """
+    for s in range(V.depth.shape[1]):
+        first, middle, last = V.depth[DOWN_SIDE, s], V.depth[UP_SIDE, s], V.depth[OWN, s]
+        most = max(first, middle, last)
+        if most - min(first, middle, last) > COLLIDING * most:
+            return True
+    return False
+
+
+@jitable
 def evaluate_plain(V: Variations, scene: Scene, m: Method, t: float, h: float) -> int:
-    """Fill f of the run itself at all stages, once for all parameters; return a code."""
+    """Fill f of the run itself at all stages, once for all parameters; return a code.
+
+    There the twin is linearised where the run's linearisation was too old in the last step for a
+    parameter.
+    """
     twin, x = view(V.words[TWIN], Scene), V.stage[POINT]
     p = in_workspace(V.words[UP])[0]
+    own = begin_step(V, m, t)
     set_parameter(V, twin, scene, 0, 0.0)
     for j in range(3):
         for i in range(len(m.y)):
             x[i] = m.y[i] + m.k[STAGES_AT + j, i]
         code = call_int(p.rhs, (p.context, t + C[j] * h, C[j] * h, x, V.plain[j]))
+        if code == 0 and j == MIDDLE and own:
+            code = linearise(V, t, h, C[j] * h, x, V.plain[j], V.stage[REAL])
         if code != 0:
             return code
-    keep_depths(V, twin, OWN)
+        keep_depths(V, twin, DOWN_SIDE if j == 0 else UP_SIDE if j == 1 else OWN)
+    V.words[COLLIDES] = 1 if depths_change(V) else 0
     keep_memory(V, twin, OWN)
     V.words[PLAIN] = 1
     return 0
+
+
+@jitable
+def linearise_anew(V: Variations, scene: Scene, m: Method, t: float, h: float) -> int:
+    """Linearise the twin at the stage in the middle; return a code."""
+    x, late = V.stage[POINT], C[MIDDLE] * h
+    p = in_workspace(V.words[UP])[0]
+    set_parameter(V, view(V.words[TWIN], Scene), scene, 0, 0.0)
+    for i in range(len(m.y)):
+        x[i] = m.y[i] + m.k[STAGES_AT + MIDDLE, i]
+    code = call_int(p.rhs, (p.context, t + late, late, x, V.stage[SLOPE]))
+    return code or linearise(V, t, h, late, x, V.stage[SLOPE], V.stage[REAL])
 
 
 @jitable
@@ -206,55 +231,79 @@ def stay_unit(V: Variations, m: Method, k: int, bodies: int) -> None:
 
 
 @jitable
-def implicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
-    """Fill derivative k at the end of the step that is taken; return a code."""
-    own = in_workspace(V.words[UP])[0]
-    e = one_side(V, m, k)
-    code = 0 if V.words[PLAIN] == 1 else evaluate_plain(V, scene, m, t, h)
-    if code != 0:
-        return code
-    extrapolate(V, m, h, k)
+def correct_once(
+    V: Variations, scene: Scene, m: Method, t: float, h: float, k: int, e: float
+) -> int:
+    """Evaluate and correct the stages once, along what holds; return a code."""
+    code = evaluate_stages(V, scene, m, t, h, k, e)
+    code = code or correct(V, in_workspace(V.words[UP])[0], m, t, h, k)
+    if code == 0 and V.words[JOINTS] == 1:
+        code = project_stages(V, scene, m, t, h, k)
+    elif code == 0:
+        stay_unit(V, m, k, len(scene.bodies.mass))
+    return code
+
+
+@jitable
+def solve_stages(
+    V: Variations, scene: Scene, m: Method, t: float, h: float, k: int, e: float
+) -> int:
+    """Solve for the stages of derivative k; return a code."""
     before, largest = math.inf, 1.0
     for i in range(len(m.y)):
         largest = max(largest, abs(m.y[i]) / V.scale[i])
-    rate, rounding = V.rate[k] ** FORGET, ROUNDING / abs(e) * largest
-    touches = V.words[REMEMBERED] == 0 and scene.work.hit[len(scene.work.hit) - 1] > 0
-    left = V.enough[LEFT] * (IN_IMPACT if touches else 1.0)
-    for iteration in range(MOST):
-        code = evaluate_stages(V, scene, m, t, h, k, e)
-        if code != 0:
-            return code
-        code = correct(V, own, m, t, h, k)
-        if code == 0 and V.words[JOINTS] == 1:
-            code = project_stages(V, scene, m, t, h, k)
-        else:
-            stay_unit(V, m, k, len(scene.bodies.mass))
+    rate = V.rate[k] ** (FORGET_OF_CONTACTS if len(scene.contacts.id) > 0 else FORGET)
+    rounding, left = ROUNDING / abs(e) * largest, V.enough[LEFT]
+    if V.words[COLLIDES] == 1 and V.words[REMEMBERED] == 0:
+        left *= IN_IMPACT
+    for _ in range(MOST):
+        code = correct_once(V, scene, m, t, h, k, e)
         if code != 0:
             return code
         size, whole = moved(V, k)
         if not size < math.inf:
-            return Code.NOT_CONVERGED
-        if iteration > 0:
+            break
+        if before < math.inf:
             now = min(size / before, 0.99) if before > 0.0 else 0.0
             # of what is rounded no rate is known but that it is no larger
             rate = now if size > rounding else min(now, rate)
-        if rate / (1.0 - rate) * size <= left * whole:
-            break
         slow = size > SLOW * before
-        if slow and size <= rounding:
+        if rate / (1.0 - rate) * size <= left * whole or (slow and size <= rounding):
+            V.rate[k] = max(rate, LEAST_RATE)
+            return 0
+        if size > POOR * before and V.stale[k] == 0:
+            V.stale[k] = 1
+            code = 0 if V.words[LINEARISED] == 1 else linearise_anew(V, scene, m, t, h)
+            if code != 0:
+                return code
+            take_systems(V, k)
+            before, rate = math.inf, UNKNOWN
+            continue
+        if slow:
             break
-        if slow or iteration + 1 == MOST:
-            return Code.NOT_CONVERGED
         before = size
-    V.rate[k] = max(rate, LEAST_RATE)
-    code = estimate_error(V, scene, m, t, h, k, e)
-    keep_polynomial(V, m, k)
-    V.smooth[k] = 1
+    return Code.NOT_CONVERGED
+
+
+@jitable
+def implicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
+    """Fill derivative k at the end of the step that is taken; return a code."""
+    e = one_side(V, m, k)
+    code = 0 if V.words[PLAIN] == 1 else evaluate_plain(V, scene, m, t, h)
     if code != 0:
         return code
-    if V.words[REMEMBERED] > 0:
+    take_systems(V, k)
+    predict(V, m, h, k, V.stage[Z : Z + 3])
+    code = solve_stages(V, scene, m, t, h, k, e)
+    if code != 0:
+        return code
+    code = estimate_error(V, scene, m, t, h, k, e)
+    note_bend(V, m, h, k, V.stage[Z + 2])
+    keep_polynomial(V, m, k)
+    V.smooth[k] = 1
+    if code == 0 and V.words[REMEMBERED] > 0:
         keep_change(V, k, e, OWN)
-    return 0
+    return code
 
 
 @jitable

@@ -34,12 +34,16 @@ if TYPE_CHECKING:
 
 Array = np.ndarray[Any, Any]
 #: State that counts and judges: the twin's own, so that it leaves the run's alone.
-_OWN_STATE = ("log/", "audit/", "rows/", "state/memory", "state/before", "state/chattering")
+_OWN_STATE = (
+    "log/", "audit/", "rows/", "state/memory", "state/before", "state/chattering",
+    "work/friction_slope",
+)  # fmt: skip
 #: The error of a step of a derivative may be this part of it, or so many tol.
 ENOUGH, ENOUGH_TOL = 1e-9, 10.0
-#: What an iteration may leave, over the error of a step; of a derivative, where friction remembers:
-#: when it sticks and slips follows from depths, which are far smaller than the model.
-LEFT, LEFT_OF_MEMORY = 0.05, 1e-13
+#: What an iteration may leave, over the error of a step; where there are contacts, as when they
+#: touch follows from it; of a derivative, where friction remembers: when that sticks and slips
+#: follows from depths, which are far smaller than the model.
+LEFT, LEFT_OF_CONTACTS, LEFT_OF_MEMORY = 0.3, 0.05, 1e-12
 #: What parts of usual steps of differences, and of the least ones, those to one side take.
 ONE_SIDED, ONE_SIDED_IN_IMPACTS = (3.0, 1.0, 1.0), (1.0, 0.1, 0.3)
 #: What is no signal of the motion.
@@ -65,6 +69,8 @@ def twin_of(system: System, directions: Sequence[Direction]) -> System:
     for name, array in tags.arrays(scene, tags.STATE):
         if name.startswith(_OWN_STATE):
             own[name] = array.copy()
+    # which linearisation it has is its own
+    own["world/hooks"] = scene.world.hooks.copy()
     rows = 2 * len(directions)
     for name, array in tags.arrays(scene.rows, tags.SCRATCH, "rows/"):
         own[name] = np.zeros((rows * len(array), *array.shape[1:]), array.dtype)
@@ -139,7 +145,7 @@ class Sensitivities:
                     base.append(float(own.ravel()[k]))
                     slope.append(float(table.ravel()[k]))
             first.append(len(place))
-        rows, enough = len(scene.rows.time), max(ENOUGH, ENOUGH_TOL * tol)
+        rows = len(scene.rows.time)
         held = at.HELD if shape[1] else 0
         return Variations(
             words=np.zeros(at.WORDS, dtype=np.int64),
@@ -157,8 +163,10 @@ class Sensitivities:
             path=np.zeros((0, n)),
             work=np.zeros((WORK, n)),
             error=np.zeros(count),
-            enough=np.array((enough, LEFT_OF_MEMORY if shape[1] else LEFT * enough)),
+            enough=_enough(self.system, tol),
             rate=np.full(count, 0.99),
+            bend=np.zeros((count, n)),
+            **{name: np.zeros(count, dtype=np.int64) for name in ("stale", "bend_known")},
             bends=np.zeros(count, dtype=np.int64),
             bent=np.zeros(count, dtype=np.int64),
             jump=np.zeros((5, n)),
@@ -183,9 +191,7 @@ class Sensitivities:
             shown=np.zeros((count, 2)),
             change=np.zeros((at.MOST_CHANGES, 2)),
             row=np.zeros((4, n)),
-            one_sided=np.array(
-                ONE_SIDED_IN_IMPACTS if self.system.contact_ids and not shape[1] else ONE_SIDED
-            ),
+            one_sided=_one_sided(self.system),
             scale=_scale(self.system, n),
             room=_scale(self.system, n) * _steps(self.system, n),
             weights=np.zeros(0),
@@ -218,6 +224,8 @@ class Sensitivities:
 
     def bind(self, running: scheme.Scheme, problem: Problem, workspace: Any) -> None:
         """Go on with the method that runs; `workspace` is the table of its own."""
+        from mbsim.compile_model.program_dependence import find_depends
+        from mbsim.compile_model.tangent import make_tangent
         from mbsim.integrators import galpha
 
         words, n = self.arrays.words, self.arrays.d.shape[1]
@@ -228,7 +236,7 @@ class Sensitivities:
         )
         words[at.RHS] = problem.rhs
         own = own._replace(rhs=jit.address(rhs_hook, HOOK))
-        kept = []
+        kept: list[Any] = []
         kinds = configuration.kinds(len(self.system.body_ids), n)
         for word in (at.UP, at.DOWN):
             method = scheme.make(running, np.zeros(n), 0.0, kinds)
@@ -237,6 +245,16 @@ class Sensitivities:
             table = pack(space)
             words[word] = int(table.ctypes.data)
             kept.append((space, table))
+        hooks = self.twin.scene.world.hooks
+        hooks[...] = self.system.scene.world.hooks
+        words[at.RUN_TANGENT] = hooks[Hook.TANGENT]
+        if running.implicit:
+            made = make_tangent(
+                self.twin.scene, find_depends(self.twin.scene), problem.solve_pair != 0
+            )
+            table = pack(made)
+            kept.append((made, table))
+            words[at.OWN_TANGENT] = int(table.ctypes.data)
         words[at.METHOD] = int(workspace.ctypes.data)
         words[at.TWIN] = int(self._table.ctypes.data)
         words[at.ATTEMPT] = 0 if running.implicit else jit.address(running.attempt, HOOK)
@@ -290,7 +308,8 @@ class Sensitivities:
     def _pack(self) -> None:
         """Let compiled code find the arrays."""
         self._words = pack(self.arrays)
-        self.system.scene.world.hooks[AT] = int(self._words.ctypes.data)
+        for system in (self.system, self.twin):
+            system.scene.world.hooks[AT] = int(self._words.ctypes.data)
 
     def tables(self, asked: Sequence[str]) -> tuple[dict[str, Array], dict[str, dict[str, Any]]]:
         """Return derivatives of all signals by dataset, and attributes of each parameter's group.
@@ -332,6 +351,20 @@ class Sensitivities:
             )
             if lost < math.inf
         ]
+
+
+def _enough(system: System, tol: float) -> Array:
+    """Return what the error of a step may be, and what an iteration may leave."""
+    enough = max(ENOUGH, ENOUGH_TOL * tol)
+    if system.scene.state.memory.shape[1]:
+        return np.array((enough, LEFT_OF_MEMORY))
+    return np.array((enough, enough * (LEFT_OF_CONTACTS if system.contact_ids else LEFT)))
+
+
+def _one_sided(system: System) -> Array:
+    """Return what parts of usual steps of differences those to one side take."""
+    collides = system.contact_ids and not system.scene.state.memory.shape[1]
+    return np.array(ONE_SIDED_IN_IMPACTS if collides else ONE_SIDED)
 
 
 def _part(block: Block, rows: slice) -> Block:

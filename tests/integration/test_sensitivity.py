@@ -275,6 +275,17 @@ def test_parameters_of_one_law_are_as_each_alone(integrator):
             assert (found == alone).all()
 
 
+@pytest.mark.parametrize("integrator", ["DOPRI5", "RADAU5", "GALPHA"])
+def test_linearisations_of_derivatives_leave_a_run_that_sticks_and_slips_alone(integrator):
+    names = ["Force_Contact[301].mu_static", "Force_Contact[301].mu_dynamic"]
+    how = {"end_time": 6.0, "integrator": integrator, "tol": 1e-8, "print_interval": 0.4}
+    with run_model("belt_stick_slip.xml", sensitivity=names, **how) as run:
+        found, work = run["bodies/2/position"], run.stats["rhs_evaluations"]
+    with run_model("belt_stick_slip.xml", **how) as run:
+        assert (found == run["bodies/2/position"]).all()
+        assert work == run.stats["rhs_evaluations"]
+
+
 @pytest.mark.parametrize("integrator", ["DOPRI5", "DOP853"])
 def test_a_last_stop_with_little_force_left_is_known(integrator):
     # of its time both sides of a difference are no straight line: it stops with 1/25 of the force

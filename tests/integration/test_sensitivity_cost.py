@@ -25,12 +25,14 @@ def cost(deck, integrator, names, **how):
     [
         ("free_top", "DOPRI5", INERTIAS[:1], 1.1),
         ("free_top", "DOP853", INERTIAS[:1], 1.4),
-        ("free_top", "RADAU5", INERTIAS[:1], 1.0),
+        ("free_top", "RADAU5", INERTIAS[:1], 0.8),
         ("bowling_ball", "DOPRI5", ["Body_Rigid[2].v_ic_x"], 1.3),
-        ("bowling_ball", "RADAU5", ["Body_Rigid[2].v_ic_x"], 1.0),
+        ("bowling_ball", "RADAU5", ["Body_Rigid[2].v_ic_x"], 0.8),
         ("sdnd100", "DOPRI5", [f"{CONTACT}.mu_dynamic"], 2.0),
         ("sdnd100", "DOP853", [f"{CONTACT}.mu_dynamic"], 2.0),
-        ("sdnd100", "RADAU5", [f"{CONTACT}.mu_dynamic"], 1.5),
+        ("sdnd100", "RADAU5", [f"{CONTACT}.mu_dynamic"], 1.1),
+        # what it sticks by is new to the linearisation that the run goes on with
+        ("belt_stick_slip", "RADAU5", [f"{CONTACT}.mu_static"], 1.5),
     ],
 )
 def test_a_parameter_takes_no_more_than_the_manual_says(deck, integrator, names, most):
@@ -40,8 +42,8 @@ def test_a_parameter_takes_no_more_than_the_manual_says(deck, integrator, names,
 def test_parameters_share_the_evaluations_of_the_run_itself():
     first, own = cost("free_top", "RADAU5", INERTIAS[:1])
     three, _ = cost("free_top", "RADAU5", INERTIAS)
-    # three stages a step are the run's own
-    assert (three - first) / 2.0 < 0.7 * first
+    # three stages a step are the run's own, and one iteration is enough
+    assert (three - first) / 2.0 < 0.4
     assert own > 0
 
 
