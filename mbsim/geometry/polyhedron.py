@@ -51,6 +51,9 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 PARALLEL = 1e-16
 #: Two edges must overlap less than a face by this part, as between boxes.
 FACES_FIRST = 1e-6
+#: Part of a face's size by which a corner may be beyond another face's edge and be on it: corners
+#: of equal prisms lie on each other to the rounding of single precision in files.
+TIE = 1e-6
 #: Rows of two polyhedra at most, and pairs of their edges; larger ones go through FCL.
 HULL_SLOTS = 64
 MOST_EDGE_PAIRS = 4096
@@ -252,10 +255,12 @@ def common_polygon(
     capacity = count_i + count_j + 4
     polygons = np.empty((2 * capacity, 3))
     polygon, other = polygons[:capacity], polygons[capacity:]
+    size = 0.0
     for k in range(count_i):
         p = sub(corner(a, a[loops_i + 2 * (end_i - 1 - k)]), origin)
         p = sub(p, scale(dot(p, nj) / dot(n, nj), n))
         polygon[k, X], polygon[k, Y], polygon[k, TAG] = dot(p, along), dot(p, across), k
+        size = max(size, norm(p))
     count = count_i
     for k in range(count_j):
         after = k + 1 if k + 1 < count_j else 0
@@ -264,7 +269,8 @@ def common_polygon(
         e = sub(q, p)
         nx, ny = dot(e, across), -dot(e, along)
         limit = nx * dot(p, along) + ny * dot(p, across)
-        count = clip(polygon, count, other, nx, ny, limit, count_i + k)
+        tie = TIE * size * norm(e)
+        count = clip(polygon, count, other, nx, ny, limit, count_i + k, tie)
         polygon, other = other, polygon
     if count == 0:
         return
