@@ -93,3 +93,26 @@ def test_prisms_that_coincide_carry_as_one(tmp_path: Path) -> None:
                 run.state = moved
                 loads.append(float(run.signals["contacts/302/force"][2]))
     assert np.ptp(loads) < 1e-3 * np.abs(loads).max()
+
+
+def test_a_box_half_beside_an_end_of_its_width_carries_as_beside_it(tmp_path: Path) -> None:
+    """Corners lie on the rim there, and two edges only touch it: half a rim and two corners."""
+    size = text.attributes(type="Cylinder", radius=RADIUS, length=RADIUS)
+    sides = text.attributes(length_x=2.0 * RADIUS, length_y=2.0 * RADIUS, length_z=RADIUS)
+    loads = []
+    for way in (-1e-7, -1e-12, 0.0, 1e-12, 1e-7):
+        place = (RADIUS + way, 0.0, 1.5 * RADIUS - DEPTH)
+        parts = [
+            text.GROUND,
+            text.marker(11, 1, (0.0, 0.0, 0.0)),
+            f'<Post_Graphic id="100" center_marker_id="11" {size}/>',
+            text.body(2, 1.0, (3e-3, 3e-3, 5e-3), place),
+            text.marker(21, 2, place),
+            f'<Post_Graphic id="200" type="BoxDefinedFromCenter" center_marker_id="21" {sides}/>',
+            text.contact(301, [200], [100], **text.impact(1e6, 1.0, 0.0, 1e-3)),
+        ]
+        path = tmp_path / "box.xml"
+        path.write_text(text.deck("box", parts, 1.0), encoding="utf-8")
+        with mbsim.open(str(path), integrator="DOPRI5") as run:
+            loads.append(float(run.signals["contacts/301/force"][2]))
+    assert loads == pytest.approx([3.5 * 1e6 * DEPTH] * 5, rel=1e-2)

@@ -153,6 +153,19 @@ def clip_edge(row: F1, ax: float, ay: float, bx: float, by: float, r: float) -> 
 
 
 @jitable
+def end_at_corners(work: F2) -> None:
+    """Let a cut edge enter or leave the disc at its corner where the edge beyond is not cut.
+
+    That is a corner on the circle, whose other edge only touches it.
+    """
+    for e in range(4):
+        if work[2 * e, 7] == 1.0 and work[2 * ((e + 1) % 4), 7] == 0.0:
+            work[2 * e, 5] = 1.0
+        if work[2 * e, 7] == 1.0 and work[2 * ((e + 3) % 4), 7] == 0.0:
+            work[2 * e, 4] = 1.0
+
+
+@jitable
 def put_corners(work: F2, disc: Disc, n: V3, weight: float) -> None:
     """Turn the cut edges in the rows of `work` into points where they enter and leave the disc."""
     centre, u, v, r, depth0, rise = disc
@@ -232,6 +245,7 @@ def disc_on_face(i: Shape, j: Shape, end: int, k: int, n: V3, f: float, points: 
             beyond = True
     if cuts == 0 and (beyond or not inside):
         return -1.0
+    end_at_corners(work)
 
     # arcs from where one edge leaves to where the next enters, into rows 2 e + 1
     arcs = work[1::2]
