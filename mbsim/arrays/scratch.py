@@ -65,10 +65,10 @@ class Sweep(NamedTuple):
     point.
     """
 
-    H: F3  # (nt, 6, 6) articulated inertia
+    H: F3  # (nt, 6, 6) articulated inertia, its lower triangle
     S: F3  # (nt, 6, 6) free directions by rows
-    W: F3  # (nt, 6, 6) L^-1 S'H by rows, L L' = S'H S
-    L: F3  # (nt, 6, 6)
+    W: F3  # (nt, 6, 6) L^-1 S'H by rows, L D L' = S'H S
+    L: F3  # (nt, 6, 6) with 1/D on its diagonal
     c: F2  # (nt, 6) acceleration of the child that follows from velocities
     p: F2  # (nt, 6) force that the body would need, articulated
     z: F2  # (nt, 6) forces, then accelerations, in the free directions

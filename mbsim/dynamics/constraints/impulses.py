@@ -18,7 +18,7 @@ from mbsim.dynamics.constraints.equations import (
 )
 from mbsim.dynamics.constraints.in_use import active_count
 from mbsim.dynamics.constraints.projection import prepare_equations
-from mbsim.dynamics.constraints.tree import respond, six
+from mbsim.dynamics.constraints.tree import plus, respond, six
 
 
 @jitable
@@ -119,11 +119,16 @@ def take_scaled(left: F1, factor: float, other: F1) -> None:
 
 
 @jitable
-def divide(row: F1, by: float) -> None:
-    """Divide numbers."""
-    part = 1.0 / by
+def multiply(row: F1, by: float) -> None:
+    """Multiply numbers."""
     for e in range(len(row)):
-        row[e] *= part
+        row[e] *= by
+
+
+@jitable
+def scaled(factor: float, row: F1) -> V6:
+    """Return so many times a spatial vector."""
+    return plus((0.0, 0.0, 0.0, 0.0, 0.0, 0.0), factor, six(row))
 
 
 @jitable
@@ -138,7 +143,6 @@ def pass_columns_up(scene: Scene, k: int, forces: F3, shares: F3, loaded: I1) ->
         take_along(z, six(S[q]), p)
         for j in range(q):
             take_scaled(z, L[q, j], share[j])
-        divide(z, L[q, q])
     if parent < 0:
         return
     above = forces[parent]
@@ -148,7 +152,7 @@ def pass_columns_up(scene: Scene, k: int, forces: F3, shares: F3, loaded: I1) ->
     else:
         add_columns(above, p)
     for q in range(tree.free[k]):
-        add_along(above, six(W[q]), share[q])
+        add_along(above, scaled(L[q, q], W[q]), share[q])
 
 
 @jitable
@@ -164,9 +168,9 @@ def pass_columns_down(scene: Scene, k: int, forces: F3, shares: F3, loaded: I1) 
             take_along(share[q], six(W[q]), forces[parent])
     loaded[k] = 0
     for q in range(free - 1, -1, -1):
+        multiply(share[q], L[q, q])
         for j in range(q + 1, free):
             take_scaled(share[q], L[j, q], share[j])
-        divide(share[q], L[q, q])
     if parent >= 0:
         fill_columns(a, forces[parent])
     else:

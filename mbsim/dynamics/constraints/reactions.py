@@ -25,7 +25,7 @@ from mbsim.dynamics.constraints.equations import (
     tree_index,
 )
 from mbsim.dynamics.constraints.in_use import active_count, is_active, is_friction, is_off
-from mbsim.dynamics.constraints.tree import origin, respond
+from mbsim.dynamics.constraints.tree import origin, plus, respond, six, times
 
 #: A self-stress that others leave less of than this part is none of its own.
 _NEW = 1e-9
@@ -50,11 +50,9 @@ def add_reaction(
 def add_tree_reaction(scene: Scene, y: F1, c: int, motion: F2, out: F1) -> None:
     """Add what the joint of the tree carries: H A + p of all that hangs on it."""
     sweep, k = scene.sweep, scene.connections.tree[c]
+    carried = plus(six(sweep.p[k]), 1.0, times(sweep.H[k], six(motion[k])))
     for i in range(6):
-        total = sweep.p[k, i]
-        for j in range(6):
-            total += sweep.H[k, i, j] * motion[k, j]
-        sweep.z[k, i] = total
+        sweep.z[k, i] = carried[i]
     # on the child; marker I may be on the parent
     factor = -1.0 if scene.connections.flip[c] == 1 else 1.0
     add_reaction(scene, y, c, k, sweep.z[k], factor, out)

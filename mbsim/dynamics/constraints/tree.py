@@ -78,14 +78,14 @@ def plus(a: V6, factor: float, b: V6) -> V6:
 
 @jitable
 def times(H: F2, a: V6) -> V6:
-    """Return H a, rows of H times a."""
+    """Return H a of a symmetric H, whose lower triangle is read."""
     return (
-        inner(six(H[0]), a),
-        inner(six(H[1]), a),
-        inner(six(H[2]), a),
-        inner(six(H[3]), a),
-        inner(six(H[4]), a),
-        inner(six(H[5]), a),
+        inner((H[0, 0], H[1, 0], H[2, 0], H[3, 0], H[4, 0], H[5, 0]), a),
+        inner((H[1, 0], H[1, 1], H[2, 1], H[3, 1], H[4, 1], H[5, 1]), a),
+        inner((H[2, 0], H[2, 1], H[2, 2], H[3, 2], H[4, 2], H[5, 2]), a),
+        inner((H[3, 0], H[3, 1], H[3, 2], H[3, 3], H[4, 3], H[5, 3]), a),
+        inner((H[4, 0], H[4, 1], H[4, 2], H[4, 3], H[4, 4], H[5, 4]), a),
+        inner((H[5, 0], H[5, 1], H[5, 2], H[5, 3], H[5, 4], H[5, 5]), a),
     )
 
 
@@ -158,7 +158,7 @@ def fill_directions(scene: Scene, y: F1, k: int) -> None:
 
 @jitable
 def fill_inertia(scene: Scene, k: int, H: F2) -> None:
-    """Fill the inertia of the body at tree index k about O; `arm` is known."""
+    """Fill the inertia of the body at tree index k about O, its lower triangle; `arm` is known."""
     b, r = scene.tree.body[k], vector(scene.sweep.arm[k])
     R, J, m = scene.work.R[b], scene.bodies.inertia[b], scene.bodies.mass[b]
     square = dot(r, r)
@@ -168,19 +168,15 @@ def fill_inertia(scene: Scene, k: int, H: F2) -> None:
             R[i, 0] * J[0, 1] + R[i, 1] * J[1, 1] + R[i, 2] * J[2, 1],
             R[i, 0] * J[0, 2] + R[i, 1] * J[1, 2] + R[i, 2] * J[2, 2],
         )
-        for j in range(3):
+        for j in range(i + 1):
             turned = row[0] * R[j, 0] + row[1] * R[j, 1] + row[2] * R[j, 2]
             H[i, j] = turned + m * ((square if i == j else 0.0) - r[i] * r[j])
             H[3 + i, 3 + j] = m if i == j else 0.0
-        H[i, 3 + i] = 0.0
         H[3 + i, i] = 0.0
     # m [r]x couples angular with linear
-    H[0, 4] = H[4, 0] = -m * r[2]
-    H[0, 5] = H[5, 0] = m * r[1]
-    H[1, 3] = H[3, 1] = m * r[2]
-    H[1, 5] = H[5, 1] = -m * r[0]
-    H[2, 3] = H[3, 2] = -m * r[1]
-    H[2, 4] = H[4, 2] = m * r[0]
+    H[3, 1], H[3, 2] = m * r[2], -m * r[1]
+    H[4, 0], H[4, 2] = -m * r[2], m * r[0]
+    H[5, 0], H[5, 1] = m * r[1], -m * r[0]
 
 
 @jitable
@@ -203,34 +199,36 @@ def fill_body(scene: Scene, y: F1, k: int) -> None:
 
 @jitable
 def factor_free(scene: Scene, k: int) -> None:
-    """Fill L and W at tree index k: D = S'HS = L L', W = L^-1 S'H."""
+    """Fill L and W at tree index k: S'HS = L D L', W = L^-1 S'H; 1/D is on L's diagonal."""
     sweep, free = scene.sweep, scene.tree.free[k]
     H, S, W, L = sweep.H[k], sweep.S[k], sweep.W[k], sweep.L[k]
     for q in range(free):
         s = six(S[q])
         u = times(H, s)
         for r in range(q):
-            # W[r] is done, so that L[q, r] = S[q] . W[r]
-            part = inner(six(W[r]), s)
-            L[q, r] = part
+            # W[r] is done, so that D L'[r, q] = W[r] . S[q]
             w = six(W[r])
-            u = plus(u, -part, w)
-        size = math.sqrt(inner(u, s))
-        L[q, q] = size
+            L[q, r] = L[r, r] * inner(w, s)
+            u = plus(u, -L[q, r], w)
+        resists = inner(u, s)
+        # what does not resist in a free direction has no acceleration
+        L[q, q] = 1.0 / resists if resists > 0.0 else math.nan
         for i in range(6):
-            W[q, i] = u[i] / size
+            W[q, i] = u[i]
 
 
 @jitable
 def hang_on(scene: Scene, k: int, above: F2) -> None:
-    """Add what tree index k resists beside its free directions, H - W'W, to an inertia above."""
-    H, W = scene.sweep.H[k], scene.sweep.W[k]
+    """Add what tree index k resists beside its free directions, H - W' D^-1 W, to an inertia above.
+
+    Of both the lower triangle.
+    """
+    H, W, L = scene.sweep.H[k], scene.sweep.W[k], scene.sweep.L[k]
     for i in range(6):
         row = six(H[i])
         for q in range(scene.tree.free[k]):
-            w, factor = six(W[q]), W[q, i]
-            row = plus(row, -factor, w)
-        for j in range(6):
+            row = plus(row, -L[q, q] * W[q, i], six(W[q]))
+        for j in range(i + 1):
             above[i, j] += row[j]
 
 
@@ -276,7 +274,7 @@ def pass_up(scene: Scene, k: int, moving: int) -> None:
         total = -inner(six(S[q]), p)
         for j in range(q):
             total -= L[q, j] * z[j]
-        z[q] = total / L[q, q]
+        z[q] = total
     if parent < 0:
         return
     up, above = p, sweep.p[parent]
@@ -287,14 +285,14 @@ def pass_up(scene: Scene, k: int, moving: int) -> None:
         w, share = six(W[q]), z[q]
         if moving == 1:
             share -= inner(w, six(sweep.c[k]))
-        up = plus(up, share, w)
+        up = plus(up, L[q, q] * share, w)
     for i in range(6):
         above[i] += up[i]
 
 
 @jitable
 def pass_down(scene: Scene, k: int, moving: int, out: F2) -> None:
-    """Find the acceleration at tree index k from that of its parent: L' q'' = z - W a."""
+    """Find the acceleration at tree index k from that of its parent: D L' q'' = z - W a."""
     sweep, free, parent = scene.sweep, scene.tree.free[k], scene.tree.parent[k]
     S, W, L, z = sweep.S[k], sweep.W[k], sweep.L[k], sweep.z[k]
     a = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -304,11 +302,10 @@ def pass_down(scene: Scene, k: int, moving: int, out: F2) -> None:
         c = six(sweep.c[k])
         a = plus(a, 1.0, c)
     for q in range(free):
-        z[q] -= inner(six(W[q]), a)
+        z[q] = L[q, q] * (z[q] - inner(six(W[q]), a))
     for q in range(free - 1, -1, -1):
         for j in range(q + 1, free):
             z[q] -= L[j, q] * z[j]
-        z[q] /= L[q, q]
     for q in range(free):
         s, rise = six(S[q]), z[q]
         a = plus(a, rise, s)
