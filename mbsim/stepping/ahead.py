@@ -1,8 +1,12 @@
-"""Pairs that may meet within a step and give no points while they are apart: where they will.
+"""Pairs that meet within a step: where they will.
 
-Cylinders on boxes and on each other, polyhedra, ellipsoids on what is not flat: apart, their closed
-forms give a lower bound of the distance. Such a pair is moved ahead by no more than that bound lets
-it, again and again, until it overlaps or the step is over (conservative advancement: B. Mirtich,
+Impulses act there, with the arms and the normal of then. A sphere that comes down 5 mm within a
+step would else be turned as if its radius were 2.5 mm more, and lose or gain spin by that.
+
+Planes, spheres and boxes give points while they are apart, which say when they meet. Cylinders on
+boxes and on each other, polyhedra, ellipsoids on what is not flat: apart, their closed forms give a
+lower bound of the distance. Such a pair is moved ahead by no more than that bound lets it, again
+and again, until it overlaps or the step is over (conservative advancement: B. Mirtich,
 Impulse-based Dynamic Simulation of Rigid Body Systems, Berkeley 1996, section 2.3). Where it
 overlaps its rows are contact points as of any other pair; their gaps are what the same motion
 leaves of them at the step's begin. So nothing passes through anything, however thin. Lines and
@@ -15,15 +19,17 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.scene import Scene
-from mbsim.core.arrays import F1, V3
+from mbsim.core.arrays import F1, F2, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.detection import measure_pair
 from mbsim.dynamics.contact.forces import sides
 from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT
-from mbsim.stepping.arrays import Motion, Stepping
-from mbsim.stepping.points import deepest_of, is_point, put_place, slop_of
+from mbsim.stepping.arrays import POINTS, SLOP, SLOWEST, Motion, Stepping
+from mbsim.stepping.displacements import meets_at
+from mbsim.stepping.friction import noise_of
+from mbsim.stepping.points import deepest_of, is_point, put_place, slop_of, take_rows
 
 #: A pair goes ahead by this part of its whole motion at least, and so beyond where it touches.
 LEAST_PART = 0.01
@@ -36,6 +42,13 @@ TOUCHES, THIN = 1e-3, 0.05
 #: Beside the row that carries most, one that carries less than this part is no point: where two
 #: lines cross by a rounding their ends hold them.
 LIGHT_PART = 0.01
+#: A gap up to so many times the length that does not count is one of a body that lies on, or slides
+#: along: where it meets is where it is.
+NEAR_ENOUGH = 10.0
+#: How often a pair that gives points while it is apart is measured where it is taken to meet at
+#: most, as the normal of what passes by obliquely is another one there; and by what part of the
+#: step that time changes no more.
+MEETINGS, SETTLED = 4, 1e-9
 #: Motions that are looked at before impulses are known: of both bodies, and of either one alone,
 #: as what lies on something that is held, or is held by something.
 BOTH, ONLY_I, ONLY_J = range(3)
@@ -158,15 +171,19 @@ def find_touch(scene: Scene, S: Stepping, y: F1, pair: int, h: float, depth: flo
 
 
 @jitable
-def choose_way(scene: Scene, S: Stepping, pair: int, which: int) -> None:
-    """Fill `M.way` by the mean motion of the pair's bodies without impulses, or of one of them."""
+def choose_way(scene: Scene, S: Stepping, pair: int, which: int, part: float = 1.0) -> None:
+    """Fill `M.way` by the mean motion of the pair's bodies without impulses, or of one of them.
+
+    It is that up to a part of the step.
+    """
     M = S.motion
     for side in range(2):
         g = scene.pairs.graphic_i[pair] if side == 0 else scene.pairs.graphic_j[pair]
         b = scene.graphics.body[g]
         moves = which == BOTH or which - ONLY_I == side
         for c in range(6):
-            M.way[side, c] = 0.5 * (M.before[b, c] + M.free[b, c]) if moves else 0.0
+            mean = M.before[b, c] + 0.5 * part * (M.free[b, c] - M.before[b, c])
+            M.way[side, c] = mean if moves else 0.0
 
 
 @jitable
@@ -256,6 +273,84 @@ def look_ahead_of(scene: Scene, S: Stepping, y: F1, pair: int, h: float, depth: 
             room = take_ahead(scene, S, y, pair, t, depth <= 0.0)
             break
     put_back(scene, M, pair)
+    return room
+
+
+@jitable
+def closing_speed(S: Stepping, k: int, velocity: F2) -> float:
+    """Return how fast the gap of point k grows by velocities of bodies."""
+    P, speed = S.points, 0.0
+    for side in range(2):
+        v = velocity[P.body[k, side]]
+        w = cross((v[3], v[4], v[5]), vector(P.arm[k, side]))
+        along = dot(vector(P.normal[k]), add(vector(v), w))
+        speed += along if side == 0 else -along
+    return speed
+
+
+@jitable
+def first_meeting(S: Stepping, first: int, h: float) -> float:
+    """Return when one of the points from `first` on has an impact in a step h, else h.
+
+    What comes too slowly for one is stopped where it is at the step's begin.
+    """
+    P, M, t = S.points, S.motion, h
+    for k in range(first, S.tally.count[POINTS]):
+        before, free = closing_speed(S, k, M.before), closing_speed(S, k, M.free)
+        if P.gap[k] + 0.5 * h * (before + free) < 0.0:
+            part = meets_at(P.gap[k], h, before, free)
+            slowest = max(S.rules.number[P.contact[k], SLOWEST], noise_of(S, h))
+            if before + part * (free - before) < -slowest:
+                t = min(t, part * h)
+    return t
+
+
+@jitable
+def touches(S: Stepping, first: int) -> bool:
+    """Return whether some point from `first` on is so near that it meets where it is."""
+    for k in range(first, S.tally.count[POINTS]):
+        if S.points.gap[k] <= NEAR_ENOUGH * S.plan.number[SLOP]:
+            return True
+    return False
+
+
+@jitable
+def take_where_it_meets(
+    scene: Scene, S: Stepping, y: F1, pair: int, h: float, first: int, reach: float
+) -> bool:
+    """Let points of a pair, from `first` on, be those of where it meets; False if there is no room.
+
+    What touches, or does not meet within the step, stays as it is. So does what slides over a round
+    surface so near to it that the gap is one of the way along: seen from where it meets it would
+    be none at the step's begin.
+    """
+    M, t = S.motion, h
+    if not touches(S, first):
+        t = first_meeting(S, first, h)
+    if t == h:
+        return True
+    room = True
+    keep_frames(scene, M, pair)
+    for c in range(3):
+        M.push[c] = 0.0
+    for _ in range(MEETINGS):
+        choose_way(scene, S, pair, BOTH, t / h)
+        measure_ahead(scene, S, y, pair, t)
+        S.tally.count[POINTS] = first
+        begin = scene.pairs.slot[pair]
+        for s in range(begin, begin + S.plan.rows[scene.pairs.kind[pair]]):
+            if -scene.work.points[s, AT_DEPTH] < reach and is_point(scene, pair, s):
+                room = room and add_ahead(scene, S, y, s, pair, t, True)
+        before, t = t, first_meeting(S, first, h)
+        if abs(t - before) <= SETTLED * h:
+            break
+    put_back(scene, M, pair)
+    if touches(S, first):
+        S.tally.count[POINTS] = first
+        measure_pair(scene, pair)
+        return take_rows(scene, S, y, pair, (-math.inf, reach))
+    # its rows are not those of now
+    M.measured[pair] = 0
     return room
 
 

@@ -19,7 +19,7 @@ from mbsim.core.rotation import norm, vector
 from mbsim.dynamics.bodies.awake import graphic_awake, graphics_awake
 from mbsim.dynamics.bodies.kinematics import place_graphics
 from mbsim.dynamics.contact.detection import measure_pair
-from mbsim.stepping.ahead import look_ahead_of, meets_after_all
+from mbsim.stepping.ahead import look_ahead_of, meets_after_all, take_where_it_meets
 from mbsim.stepping.arrays import ASLEEP, POINTS, SOME_AHEAD, Stepping
 from mbsim.stepping.awake import pair_awake, pairs_awake
 from mbsim.stepping.points import deepest_of, fill_reach, take_rows
@@ -46,6 +46,14 @@ def meets_sleeper(scene: Scene, S: Stepping, pair: int, reach: float, committed:
     if committed:
         scene.pairs.gap[pair] = scene.pairs.left[pair] = -depth
     return -depth <= reach
+
+
+@jitable
+def take_near(scene: Scene, S: Stepping, y: F1, pair: int, h: float, reach: float) -> bool:
+    """Take the points of a pair that has some while it is apart; False if there is no room."""
+    first = S.tally.count[POINTS]
+    room = take_rows(scene, S, y, pair, (-math.inf, reach))
+    return room and take_where_it_meets(scene, S, y, pair, h, first, reach)
 
 
 @jitable
@@ -81,7 +89,7 @@ def find_points(scene: Scene, S: Stepping, y: F1, h: float, committed: bool) -> 
             continue
         near = S.plan.near[pairs.kind[pair]] == 1
         if near and lies_still(scene, S, pair):
-            room = take_rows(scene, S, y, pair, (-math.inf, reach))
+            room = take_near(scene, S, y, pair, h, reach)
         else:
             measured += 1
             measure_pair(scene, pair)
@@ -92,7 +100,7 @@ def find_points(scene: Scene, S: Stepping, y: F1, h: float, committed: bool) -> 
                 if near and work.beyond[scene.kinds.contact[pairs.kind[pair]]] == 0:
                     M.measured[pair] = 1 + log.counters[LISTINGS]
             if near:
-                room = take_rows(scene, S, y, pair, (-math.inf, reach))
+                room = take_near(scene, S, y, pair, h, reach)
             else:
                 room = look_ahead_of(scene, S, y, pair, h, depth)
         if not room:
