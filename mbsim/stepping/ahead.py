@@ -207,6 +207,10 @@ def add_ahead(scene: Scene, S: Stepping, y: F1, s: int, pair: int, t: float, apa
     n, push = vector(point[AT_NORMAL:]), vector(M.push)
     # half way between both surfaces, where what is pushed is back
     p = add(vector(point[AT_POINT:]), scale(0.5, push))
+    pushed = dot(n, push)
+    depth = point[AT_DEPTH] - (pushed if gi == scene.pairs.graphic_i[pair] else -pushed)
+    # of what was apart each surface is where the other one's will be as they meet
+    beyond = 0.5 * depth if apart else 0.0
     closing = 0.0
     for side in range(2):
         g, b = (gi, P.body[k, 0]) if side == 0 else (gj, P.body[k, 1])
@@ -214,15 +218,14 @@ def add_ahead(scene: Scene, S: Stepping, y: F1, s: int, pair: int, t: float, apa
         way = M.way[0] if g == scene.pairs.graphic_i[pair] else M.way[1]
         v, w = vector(way), (way[3], way[4], way[5])
         x = position(scene, y, b)
-        arm = sub(p, add(x, scale(t, v)))
+        own = add(p, scale(-beyond if side == 0 else beyond, n))
+        arm = sub(own, add(x, scale(t, v)))
         speed = dot(n, add(v, cross(w, arm)))
         closing += speed if side == 0 else -speed
         for c in range(3):
             P.arm[k, side, c] = arm[c]
             P.point[k, c] = x[c] + arm[c]
-    pushed = dot(n, push)
-    P.gap[k] = -point[AT_DEPTH] - t * closing
-    P.gap[k] += pushed if gi == scene.pairs.graphic_i[pair] else -pushed
+    P.gap[k] = -depth - t * closing
     if apart:
         P.gap[k] = max(P.gap[k], 0.0)
     else:

@@ -36,6 +36,33 @@ def test_a_thrown_ball_that_bounces_rolls_at_five_sevenths_of_its_speed(
     assert results["bodies/2/velocity"][-1, 0] == pytest.approx(15.0 / 7.0, abs=1e-12)
 
 
+@pytest.mark.parametrize("step", [{"h": 0.01}, {"tol": 1e-5}, {"tol": 1e-8}])
+@pytest.mark.parametrize("shape", ["Cylinder", "Ellipsoid"])
+def test_so_does_what_is_measured_where_it_overlaps(step: dict[str, float], shape: str) -> None:
+    """A cylinder, and an ellipsoid that is a ball, on a large box: 2/3 and 5/7 of 3 m/s."""
+    sizes = {
+        "Cylinder": 'radius="0.1" length="0.2"',
+        "Ellipsoid": 'x_scale="0.1" y_scale="0.1" z_scale="0.1"',
+    }
+    # a cylinder's marker is at its end
+    end, inertia, part = (
+        ("0.1", 0.005, 2.0 / 3.0) if shape == "Cylinder" else ("0", 0.004, 5.0 / 7.0)
+    )
+    parts = [
+        text.body(2, 1.0, (0.006, inertia, 0.006), (0.0, 0.0, 0.4337), (3.0, 0.0, 0.0)),
+        f'<Reference_Marker id="21" body_id="2" pos_y="{end}" pos_z="0.4337"'
+        f' theta="{math.pi / 2}"/>',
+        f'<Post_Graphic id="200" type="{shape}" center_marker_id="21" {sizes[shape]}/>',
+        '<Reference_Marker id="11" body_id="1" pos_z="-0.5"/>',
+        '<Post_Graphic id="101" type="BoxDefinedFromCenter" center_marker_id="11"'
+        ' length_x="20" length_y="20" length_z="1"/>',
+        text.contact(301, [200], [101], **decks.rubbed(0.5, 0.5)),
+        text.gravity(),
+    ]
+    results = run(parts, step, 1.4)
+    assert results["bodies/2/velocity"][-1, 0] == pytest.approx(3.0 * part, abs=2e-4)
+
+
 @pytest.mark.parametrize("step", STEPS)
 @pytest.mark.parametrize("mu", [0.0, 0.05, 0.5])
 def test_spheres_that_meet_obliquely_part_as_they_should(step: dict[str, float], mu: float) -> None:
