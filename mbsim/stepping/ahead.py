@@ -26,7 +26,16 @@ from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.detection import measure_pair
 from mbsim.dynamics.contact.forces import sides
 from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT
-from mbsim.stepping.arrays import POINTS, SLOP, SLOWEST, Motion, Stepping
+from mbsim.stepping.arrays import (
+    KEPT_BODY_I,
+    KEPT_BODY_J,
+    POINTS,
+    SLEEPING_ROWS,
+    SLOP,
+    SLOWEST,
+    Motion,
+    Stepping,
+)
 from mbsim.stepping.displacements import meets_at
 from mbsim.stepping.friction import noise_of
 from mbsim.stepping.points import deepest_of, is_point, put_place, slop_of, take_rows
@@ -318,6 +327,19 @@ def touches(S: Stepping, first: int) -> bool:
 
 
 @jitable
+def note_crowds(S: Stepping) -> None:
+    """Note which bodies pressed on others that move in the last step."""
+    kept, crowded = S.kept, S.motion.crowded
+    ground = len(crowded) - 1
+    for b in range(len(crowded)):
+        crowded[b] = 0
+    for row in range(kept.count[SLEEPING_ROWS], kept.count[0]):
+        i, j = int(kept.table[row, KEPT_BODY_I]), int(kept.table[row, KEPT_BODY_J])
+        if i != ground and j != ground:
+            crowded[i] = crowded[j] = 1
+
+
+@jitable
 def take_where_it_meets(
     scene: Scene, S: Stepping, y: F1, pair: int, h: float, first: int, reach: float
 ) -> bool:
@@ -325,10 +347,13 @@ def take_where_it_meets(
 
     What touches, or does not meet within the step, stays as it is. So does what slides over a round
     surface so near to it that the gap is one of the way along: seen from where it meets it would
-    be none at the step's begin.
+    be none at the step's begin. Bodies that press on others go other ways than those without
+    impulses, which say where it meets: those of a crowd stay as they are too.
     """
     M, t = S.motion, h
-    if not touches(S, first):
+    i = scene.graphics.body[scene.pairs.graphic_i[pair]]
+    j = scene.graphics.body[scene.pairs.graphic_j[pair]]
+    if M.crowded[i] == 0 and M.crowded[j] == 0 and not touches(S, first):
         t = first_meeting(S, first, h)
     if t == h:
         return True
