@@ -327,16 +327,16 @@ def touches(S: Stepping, first: int) -> bool:
 
 
 @jitable
-def note_crowds(S: Stepping) -> None:
+def note_pressed(S: Stepping) -> None:
     """Note which bodies pressed on others that move in the last step."""
-    kept, crowded = S.kept, S.motion.crowded
-    ground = len(crowded) - 1
-    for b in range(len(crowded)):
-        crowded[b] = 0
+    kept, pressed = S.kept, S.motion.pressed
+    ground = len(pressed) - 1
+    for b in range(len(pressed)):
+        pressed[b] = 0
     for row in range(kept.count[SLEEPING_ROWS], kept.count[0]):
         i, j = int(kept.table[row, KEPT_BODY_I]), int(kept.table[row, KEPT_BODY_J])
         if i != ground and j != ground:
-            crowded[i] = crowded[j] = 1
+            pressed[i] = pressed[j] = 1
 
 
 @jitable
@@ -348,12 +348,12 @@ def take_where_it_meets(
     What touches, or does not meet within the step, stays as it is. So does what slides over a round
     surface so near to it that the gap is one of the way along: seen from where it meets it would
     be none at the step's begin. Bodies that press on others go other ways than those without
-    impulses, which say where it meets: those of a crowd stay as they are too.
+    impulses, which say where it meets: those stay as they are too.
     """
     M, t = S.motion, h
     i = scene.graphics.body[scene.pairs.graphic_i[pair]]
     j = scene.graphics.body[scene.pairs.graphic_j[pair]]
-    if M.crowded[i] == 0 and M.crowded[j] == 0 and not touches(S, first):
+    if M.pressed[i] == 0 and M.pressed[j] == 0 and not touches(S, first):
         t = first_meeting(S, first, h)
     if t == h:
         return True

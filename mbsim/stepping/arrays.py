@@ -140,7 +140,7 @@ class Motion(NamedTuple):
     slope: F1  # (ny,) y'
     way: F2  # (2, 6) velocities of the bodies of a pair that is moved ahead
     frames: F2  # (2, 12) of its graphics at the step's begin
-    crowded: I1  # (nb + 1,) 1 where a body pressed on another one that moves in the last step
+    pressed: I1  # (nb + 1,) 1 where a body pressed on another one that moves in the last step
     push: F1  # (3,) way back by which its first graphic is put into the other one there
     taken: I1  # (pairs + 1,) the try of a step in which a pair has points by that; last: this one
     measured: I1  # (pairs,) 1 + list of near pairs in which its rows were measured, 0: none
@@ -376,7 +376,7 @@ def make(
         slope=numbers(ny),
         way=numbers(2, 6),
         frames=numbers(2, 12),
-        crowded=whole(nb + 1),
+        pressed=whole(nb + 1),
         push=numbers(3),
         taken=whole(pairs + 1),
         measured=whole(pairs),

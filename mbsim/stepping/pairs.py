@@ -19,7 +19,7 @@ from mbsim.core.rotation import norm, vector
 from mbsim.dynamics.bodies.awake import graphic_awake, graphics_awake
 from mbsim.dynamics.bodies.kinematics import place_graphics
 from mbsim.dynamics.contact.detection import measure_pair
-from mbsim.stepping.ahead import look_ahead_of, meets_after_all, note_crowds, take_where_it_meets
+from mbsim.stepping.ahead import look_ahead_of, meets_after_all, note_pressed, take_where_it_meets
 from mbsim.stepping.arrays import ASLEEP, POINTS, SOME_AHEAD, Stepping
 from mbsim.stepping.awake import pair_awake, pairs_awake
 from mbsim.stepping.points import deepest_of, fill_reach, take_rows
@@ -70,7 +70,7 @@ def find_points(scene: Scene, S: Stepping, y: F1, h: float, committed: bool) -> 
     if pairs.count[WANTED] > 0:
         return Code.CROWDED
     fill_reach(scene, S, h)
-    note_crowds(S)
+    note_pressed(S)
     measured = 0
     for c in range(len(work.beyond)):
         work.beyond[c] = 0
