@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 _SAID_ELSEWHERE = (
     *("tol_from", "model_file", "overrides", "plugins", "interpret_plugins"),
     "allow_overlap",  # of the start alone
+    "length",  # follows from the model, which says what differs
 )
 #: What a digest that differs says, and of which facts of `Identity` it is.
 _DIGESTS = {
