@@ -51,8 +51,8 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 PARALLEL = 1e-16
 #: Two edges must overlap less than a face by this part, as between boxes.
 FACES_FIRST = 1e-6
-#: Part of a face's size by which a corner may be beyond another face's edge and be on it: corners
-#: of equal prisms lie on each other to the rounding of single precision in files.
+#: Part of the smaller face's size by which a corner may be beyond the other face's edge and be on
+#: it: corners of equal prisms coincide to the rounding of single precision in files.
 TIE = 1e-6
 #: Rows of two polyhedra at most, and pairs of their edges; larger ones go through FCL.
 HULL_SLOTS = 64
@@ -186,6 +186,17 @@ def face_at_corner(hull: F1, k: int, n: V3) -> int:
 
 
 @jitable
+def face_size(hull: F1, f: int) -> float:
+    """Return how far the corners of face f are from its first one at most."""
+    starts, loops = int(hull[AT_STARTS]), int(hull[AT_LOOPS])
+    begin, size = int(hull[starts + f]), 0.0
+    first = corner(hull, hull[loops + 2 * begin])
+    for at in range(begin + 1, int(hull[starts + f + 1])):
+        size = max(size, norm(sub(corner(hull, hull[loops + 2 * at]), first)))
+    return size
+
+
+@jitable
 def face_at_edge(hull: F1, k: int, n: V3) -> int:
     """Return the face at edge k that looks most along n."""
     at = int(hull[AT_EDGES]) + 4 * k
@@ -255,13 +266,11 @@ def common_polygon(
     capacity = count_i + count_j + 4
     polygons = np.empty((2 * capacity, 3))
     polygon, other = polygons[:capacity], polygons[capacity:]
-    size = 0.0
     for k in range(count_i):
         p = sub(corner(a, a[loops_i + 2 * (end_i - 1 - k)]), origin)
         p = sub(p, scale(dot(p, nj) / dot(n, nj), n))
         polygon[k, X], polygon[k, Y], polygon[k, TAG] = dot(p, along), dot(p, across), k
-        size = max(size, norm(p))
-    count = count_i
+    count, size = count_i, min(face_size(a, fi), face_size(b, fj))
     for k in range(count_j):
         after = k + 1 if k + 1 < count_j else 0
         p = sub(corner(b, b[loops_j + 2 * (first_j + k)]), origin)
