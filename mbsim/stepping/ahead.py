@@ -329,14 +329,12 @@ def touches(S: Stepping, first: int) -> bool:
 @jitable
 def note_pressed(S: Stepping) -> None:
     """Note which bodies pressed on others that move in the last step."""
-    kept, pressed = S.kept, S.motion.pressed
-    ground = len(pressed) - 1
-    for b in range(len(pressed)):
-        pressed[b] = 0
+    kept, pressed, taken = S.kept, S.motion.pressed, S.motion.taken
+    ground, now = len(pressed) - 1, taken[len(taken) - 1]
     for row in range(kept.count[SLEEPING_ROWS], kept.count[0]):
         i, j = int(kept.table[row, KEPT_BODY_I]), int(kept.table[row, KEPT_BODY_J])
         if i != ground and j != ground:
-            pressed[i] = pressed[j] = 1
+            pressed[i] = pressed[j] = now
 
 
 @jitable
@@ -350,10 +348,10 @@ def take_where_it_meets(
     be none at the step's begin. Bodies that press on others go other ways than those without
     impulses, which say where it meets: those stay as they are too.
     """
-    M, t = S.motion, h
+    M, t, now = S.motion, h, S.motion.taken[len(S.motion.taken) - 1]
     i = scene.graphics.body[scene.pairs.graphic_i[pair]]
     j = scene.graphics.body[scene.pairs.graphic_j[pair]]
-    if M.pressed[i] == 0 and M.pressed[j] == 0 and not touches(S, first):
+    if M.pressed[i] != now and M.pressed[j] != now and not touches(S, first):
         t = first_meeting(S, first, h)
     if t == h:
         return True

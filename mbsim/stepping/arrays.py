@@ -140,7 +140,7 @@ class Motion(NamedTuple):
     slope: F1  # (ny,) y'
     way: F2  # (2, 6) velocities of the bodies of a pair that is moved ahead
     frames: F2  # (2, 12) of its graphics at the step's begin
-    pressed: I1  # (nb + 1,) 1 where a body pressed on another one that moves in the last step
+    pressed: I1  # (nb + 1,) the try of a step before which a body pressed on one that moves
     push: F1  # (3,) way back by which its first graphic is put into the other one there
     taken: I1  # (pairs + 1,) the try of a step in which a pair has points by that; last: this one
     measured: I1  # (pairs,) 1 + list of near pairs in which its rows were measured, 0: none
