@@ -161,3 +161,17 @@ def test_a_cylinder_rolls_down_a_box(
     way = np.asarray(results["bodies/2/position"])[-1]
     assert way[0] == pytest.approx(0.5 * 2.0 / 3.0 * 9.81 * math.sin(tilt), abs=allowed)
     assert np.abs(way[1:] - (0.0, radius)).max() < 1e-7
+
+
+@pytest.mark.parametrize(
+    ("kinds", "rocks"), [(["prism", "cylinder"], True), (["prism"] * 2, False)]
+)
+def test_the_log_says_what_is_not_kept_from_rocking(
+    tmp_path: Path, kinds: list[str], rocks: bool
+) -> None:
+    """An end of a cylinder on a convex mesh is one point: whoever stands there may fall."""
+    stack(tmp_path, kinds, 1.0, 1e-2)
+    deck = str(tmp_path / "rigid.xml")
+    mbsim.simulate(deck, integrator="MOREAU", end_time=0.01, output=tmp_path / "out")
+    (log,) = (tmp_path / "out").glob("*.log")
+    assert ("not kept from rocking" in log.read_text(encoding="utf-8")) == rocks
