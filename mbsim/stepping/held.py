@@ -3,7 +3,7 @@
 An impulse moves all bodies of a group then. What it does to them takes a solution of the group's
 linear system, for each of its three components; or, where a body has many points, for each of the
 six components of a wrench on the body, of which the impulses of all its points are made. Where the
-tree of joints is all that holds them, the impulses of four points are answered at once.
+tree of joints is all that holds them, the impulses of five points are answered at once.
 """
 
 from __future__ import annotations
@@ -207,7 +207,7 @@ def keep_answers(scene: Scene, S: Stepping, root: int, k: int, column: int) -> N
 
     With the first tree that the point has, to bodies that it moves alone or not at all, too.
     """
-    P, tree, ground = S.points, scene.tree, len(S.motion.inverse)
+    P, tree = S.points, scene.tree
     i, j = P.body[k, 0], P.body[k, 1]
     roots = root_of(scene, i), root_of(scene, j)
     first = root == (roots[0] if roots[0] >= 0 else roots[1])
@@ -221,7 +221,7 @@ def keep_answers(scene: Scene, S: Stepping, root: int, k: int, column: int) -> N
             side = 0 if b == i else 1
             for a in range(3):
                 for c in range(6):
-                    moves[a, c] = alone(P, k, side, a, c) if at < 0 and b != ground else 0.0
+                    moves[a, c] = alone(P, k, side, a, c) if at < 0 else 0.0
 
 
 @jitable

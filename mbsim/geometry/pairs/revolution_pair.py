@@ -53,8 +53,8 @@ from mbsim.geometry.rotor import (
 PAIR_ROWS = 2 * ARC_ROWS + 3
 #: Nearer to where all of an end or a side is farthest all directions are searched.
 LONE = 4.5e-5
-#: Rims of discs so nearly parallel and alike lie on each other, to this part of their squares.
-LIE = 1e-6
+#: Rims coincide whose radii, seen along n, differ by less than this part in their squares.
+COINCIDE = 1e-6
 
 
 @jitable
@@ -157,7 +157,7 @@ def rims_cross(
     """Return (found, point on the plane of disc a) where both rims cross, seen along n.
 
     Two circles first; Newton on |x| = r_a and |seen on b| = r_b makes it exact for the ellipse
-    that a tilted disc is. Rims that lie on each other nearly everywhere have no such place: that of
+    that a tilted disc is. Rims that coincide nearly everywhere have no such place: that of
     the circles is as good as any.
     """
     ra, rb = a[1], b[1]
@@ -171,13 +171,13 @@ def rims_cross(
     # what a step along u, v of a is on b
     ux, uy = seen_on(b, add(b[0], a[3]), n)
     vx, vy = seen_on(b, add(b[0], a[4]), n)
-    found, lie, circles = False, False, (x, y)
+    found, coincide, circles = False, False, (x, y)
     for attempt in range(8):
         p = add(a[0], add(scale(x, a[3]), scale(y, a[4])))
         bx, by = seen_on(b, p, n)
         e, g = 0.5 * (x * x + y * y - ra * ra), 0.5 * (bx * bx + by * by - rb * rb)
         if attempt == 0:
-            lie = max(abs(e), abs(g)) <= LIE * ra * rb
+            coincide = max(abs(e), abs(g)) <= COINCIDE * ra * rb
         gx, gy = bx * ux + by * uy, bx * vx + by * vy
         det = x * gy - y * gx
         if abs(det) < 1e-9 * ra * rb:
@@ -187,7 +187,7 @@ def rims_cross(
         if dx * dx + dy * dy < 1e-20 * ra * ra:
             found = True
             break
-    if lie and not found:
+    if coincide and not found:
         found, x, y = True, circles[0], circles[1]
     return found, add(a[0], add(scale(x, a[3]), scale(y, a[4])))
 
