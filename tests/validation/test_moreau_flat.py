@@ -128,15 +128,21 @@ def test_a_pile_of_logs_rests(tmp_path: Path) -> None:
     assert moved(results, len(places)) < 1e-4 * radius
 
 
-@pytest.mark.parametrize("h", [1e-2, 5e-3, 2e-3])
-def test_a_train_of_cylinders_stays_in_line(h: float) -> None:
-    deck = train._deck({"h": h})
-    results = mbsim.simulate(deck, integrator="MOREAU", tol=1e-4)
+def out_of_line(h: float) -> float:
+    """Return how far the axis of a cylinder of the train turns out of its line at most."""
+    results = mbsim.simulate(train._deck({"h": h}), integrator="MOREAU", tol=1e-4)
+    most = 0.0
     for number in range(2, 12):
         w, x, y, z = np.asarray(results[f"bodies/{number}/quaternion"]).T
-        across = np.hypot(2.0 * (x * y - w * z), 2.0 * (y * z + w * x))
-        # it is unstable: what the solver leaves grows from impact to impact
-        assert across.max() < 2e-2
+        most = max(most, float(np.hypot(2.0 * (x * y - w * z), 2.0 * (y * z + w * x)).max()))
+    return most
+
+
+@pytest.mark.parametrize("h", [1e-2, 5e-3, 2e-3])
+def test_a_train_of_cylinders_stays_in_line(h: float) -> None:
+    """That is unstable: what the solver leaves grows from impact to impact, so five runs decide."""
+    turns = [out_of_line(h * (1.0 + part)) for part in (0.0, 1e-9, 1e-7, 1e-5, 1e-3)]
+    assert np.median(turns) < 5e-3
 
 
 @pytest.mark.parametrize(("h", "tol", "allowed"), [(2e-3, 1e-3, 5e-5), (None, 1e-5, 1e-5)])
