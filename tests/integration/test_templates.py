@@ -208,7 +208,6 @@ def test_normal_law(copy_with):
     np.testing.assert_allclose(below, swing, atol=1e-4)
 
 
-@pytest.mark.slow
 def test_statement(copy_with):
     deck = body() + '<Force_Lift id="1" i_marker_id="20" lift="2"/>'
     (found,) = run_in_copy(copy_with("statement"), (whole(deck, 1.0), ["bodies/2/position"], {}))

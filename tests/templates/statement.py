@@ -24,7 +24,7 @@ def _build(entry: Entry) -> None:
         i_marker_id=entry.get("i_marker_id", 0),
         source=entry.source,
     )
-    entry.register(entry.draft.body_forces, force)
+    entry.register("body_forces", force)
 
 
 FORCE_LIFT = Statement(
