@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mbsim.cli.messages import echo
-from mbsim.cli.options import json_option, plugin_option
+from mbsim.cli.options import RESULT_SUFFIXES, json_option, plugin_option
 
 if TYPE_CHECKING:
     from mbsim.model.elements import Model
@@ -61,7 +61,7 @@ def command(file: Path, plugins: tuple[Path, ...], as_json: bool) -> None:
 
 def _is_result(file: Path) -> bool:
     """Return whether a file is HDF5, by what it holds; one that is not there, by its name."""
-    return _begins(file, _HDF5) or file.suffix.lower() in (".h5", ".hdf5")
+    return _begins(file, _HDF5) or file.suffix.lower() in RESULT_SUFFIXES
 
 
 def _begins(file: Path, mark: bytes) -> bool:

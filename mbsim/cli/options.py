@@ -8,6 +8,9 @@ from typing import Any
 
 import click
 
+#: How names of result files end.
+RESULT_SUFFIXES = (".h5", ".hdf5")
+
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 

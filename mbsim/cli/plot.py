@@ -12,13 +12,13 @@ import click
 
 from mbsim.cli.completion import signal_names
 from mbsim.cli.messages import echo
-from mbsim.cli.options import json_option
+from mbsim.cli.options import RESULT_SUFFIXES, json_option
 
 if TYPE_CHECKING:
     from mbsim.results.curves import Choice, Picture
     from mbsim.results.reading import Results
 
-_RESULT_SUFFIXES, _TABLE_SUFFIX = (".h5", ".hdf5"), ".parquet"
+_TABLE_SUFFIX = ".parquet"
 #: Longest made-up name of a picture.
 _LONGEST = 100
 
@@ -85,10 +85,12 @@ def command(
     from mbsim.results.reading import open_results
 
     if tables := [name for name in arguments if name.lower().endswith(_TABLE_SUFFIX)]:
-        plain = over == "time" and start is None and end is None and minus is None
-        if not plain or log or events or as_json:
-            raise ModelError(f"{tables[0]}: a table of a study is drawn with -o only")
-        _draw_table(Path(tables[0]), [name for name in arguments if name != tables[0]], output)
+        asked = {"--x": over != "time", "--from": start is not None, "--to": end is not None}
+        asked |= {"--log": log, "--events": events, "--minus": minus is not None}
+        if option := next((name for name, given in asked.items() if given), None):
+            raise ModelError(f"{tables[0]}: {option} is for result files, not for a study's table")
+        rest = [name for name in arguments if name != tables[0]]
+        _draw_table(Path(tables[0]), rest, output, as_json)
         return
     paths, names = _sorted_out(arguments)
     if events and (over.strip("/") != "time" or len(paths) > 1 or minus is not None):
@@ -118,7 +120,7 @@ def command(
         echo(f"{target}: {count} curve{'s' * (count > 1)}, {quantities}")
 
 
-def _draw_table(path: Path, names: Sequence[str], output: Path | None) -> None:
+def _draw_table(path: Path, names: Sequence[str], output: Path | None, as_json: bool) -> None:
     """Draw the responses of a study: outputs over parameters, all unless some are named."""
     from mbsim.errors import ModelError
     from mbsim.results.drawing import check_target, need_matplotlib, save
@@ -141,10 +143,16 @@ def _draw_table(path: Path, names: Sequence[str], output: Path | None) -> None:
     columns = {name: table[name] for name in (*parameters, *outputs, "status")}
     failed = int((columns["status"] == "failed").sum())
     title = f"{path.stem}: {len(table)} runs" + (f", {failed} failed" if failed else "")
-    from mbsim.cli.messages import warn
+    from mbsim.cli.messages import print_json, warn
 
-    warn(save(draw_responses(columns, parameters, outputs, title), target))
-    echo(f"{target}: {len(outputs)} x {len(parameters)} panels, {len(table)} runs")
+    warnings = save(draw_responses(columns, parameters, outputs, title), target)
+    warn(warnings)
+    if as_json:
+        drawn: dict[str, object] = {"picture": str(target), "table": str(path)}
+        drawn |= {"parameters": list(parameters), "outputs": list(outputs)}
+        print_json(drawn | {"runs": len(table), "failed": failed, "warnings": warnings})
+    else:
+        echo(f"{target}: {len(outputs)} x {len(parameters)} panels, {len(table)} runs")
 
 
 def _sorted_out(arguments: Sequence[str]) -> tuple[list[Path], tuple[str, ...]]:
@@ -154,7 +162,7 @@ def _sorted_out(arguments: Sequence[str]) -> tuple[list[Path], tuple[str, ...]]:
     files: dict[Path, None] = {}
     names: dict[str, None] = {}
     for argument in arguments:
-        if argument.lower().endswith(_RESULT_SUFFIXES) or Path(argument).is_file():
+        if argument.lower().endswith(RESULT_SUFFIXES) or Path(argument).is_file():
             files[Path(argument)] = None
         else:
             names[argument.strip("/")] = None

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import click
 
 from mbsim.cli.messages import counted, echo
+from mbsim.cli.options import RESULT_SUFFIXES
 
 if TYPE_CHECKING:
     from mbsim.results.reading import Results
@@ -129,6 +130,11 @@ class _Asked:
             raise ModelError("--serve shows runs that go on, and no --mode")
         if any((self.output, self.png, self.gif, self.mp4, self.gltf)):
             raise ModelError("--serve writes no files: leave out -o, --png, --gif, --mp4, --gltf")
+        for file in self.files:
+            if not file.is_file():
+                if file.suffix.lower() not in RESULT_SUFFIXES:
+                    raise ModelError(f"{file}: no such file; a result file is named <model>.h5")
+                echo(f"{file} is not there yet; it is shown once a run writes it", err=True)
         served = Served(self.files, self.signals)
         with server(served, self.port or 0) as made:
             echo(f"http://{HOST}:{made.server_port}/ shows {', '.join(map(str, self.files))}")

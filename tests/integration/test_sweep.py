@@ -313,6 +313,13 @@ def test_the_command(tmp_path, monkeypatch):
     assert found.output == "ball/run-4: finished\n"
     found = runner.invoke(main, ["plot", "ball/ball.parquet", "x", "mu", "-o", "x.svg"])
     assert found.output == "x.svg: 1 x 1 panels, 12 runs\n"
+    found = runner.invoke(main, ["plot", "ball/ball.parquet", "x", "mu", "-o", "x.svg", "--json"])
+    drawn = {"picture": "x.svg", "table": "ball/ball.parquet", "parameters": ["mu"]}
+    drawn |= {"outputs": ["x"], "runs": 12, "failed": 0, "warnings": []}
+    assert json.loads(found.stdout) == drawn
+    found = runner.invoke(main, ["plot", "ball/ball.parquet", "--x", "mu"])
+    assert found.exit_code == 2
+    assert "--x is for result files, not for a study's table" in found.output
     found = runner.invoke(main, ["plot", "ball/ball.parquet", "nothing"])
     assert found.exit_code == 2
     assert "no column nothing to draw; there is k, mu, x" in found.output

@@ -316,6 +316,7 @@ def test_the_command_writes_page_and_gltf(file, tmp_path):
         (["{}", "--serve", "--png", "x.png"], "--serve writes no files"),
         (["{}", "--size", "9x9", "--png", "x.png"], "--size 9x9"),
         (["nothing.h5"], "no such file"),
+        (["nothing.xml", "--serve"], "no such file; a result file is named <model>.h5"),
     ],
 )
 def test_what_cannot_be_is_refused(file, arguments, words):
