@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, TypeAlias, cast
+from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeAlias, cast
 
 from mbsim.core.collection import no_collection
 from mbsim.core.stored import read_regular
@@ -45,6 +45,25 @@ _NO_FILE = "deck.xml"
 #: What may stand before the first element of a deck that is given as text.
 _BEFORE_XML = "\ufeff \t\r\n"
 _DECLARATION = re.compile(r"\A\ufeff?\s*<\?xml\b[^>]*\?>|\A\ufeff")
+
+
+class _Deck(NamedTuple):
+    """What a stream held, to be read any number of times."""
+
+    name: str | None
+    text: str | bytes
+
+    def read(self) -> str | bytes:
+        return self.text
+
+
+def to_keep(given: el.Model | Given) -> Any:
+    """Return what a deck can be read from again: of a stream, which is read here, what it held."""
+    read = getattr(given, "read", None)
+    # a deck written in Python is read as often as it is asked, and says where its faults are
+    if read is None or hasattr(given, "placed"):
+        return given
+    return _Deck(getattr(given, "name", None), read())
 
 
 def as_model(

@@ -35,8 +35,8 @@ def deck_of(model: Model, source: Any) -> Any:
         same = False
     if not same:
         raise ModelError(
-            f"sensitivity: {model.file}: the deck is not there as it was read; give simulate the "
-            "deck itself"
+            f"sensitivity: {model.file} is not there as it was read, and is read again with every "
+            "parameter changed; give simulate its path, or its text, in place of the model"
         )
     return model.file
 

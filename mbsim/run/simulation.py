@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from os import PathLike
 from pathlib import Path
@@ -61,6 +61,13 @@ def _limited(system: System, timeout: float | None, tell: Notify) -> AbstractCon
     users = (*(user for _, user in system.user_laws), *system.residuals.values())
     interpreted = system.subroutines or system.posts or not all(user.compiled for user in users)
     return limited(timeout, tell, bool(interpreted))
+
+
+def _listed(name: str, given: Iterable[Any]) -> tuple[Any, ...]:
+    """Return what was given as a list; one text is no list of its letters."""
+    if isinstance(given, (str, PathLike)):
+        raise ModelError(f"{name}={str(given)!r}: must be a list; [{str(given)!r}] has this one")
+    return tuple(given)
 
 
 def simulate(
@@ -147,14 +154,15 @@ def simulate(
     ModelError, SolverError, PluginError, ResultsError, Interrupted
         What was recorded up to there is kept.
     """
-    from mbsim.reader.xml import as_model
+    from mbsim.reader.xml import as_model, to_keep
 
+    model = to_keep(model)
     options = Options(
         end_time=end_time,
         print_interval=print_interval,
         integrator=integrator,
         tol=tol,
-        plugins=tuple(plugins),
+        plugins=_listed("plugins", plugins),
         output=output,
         resume=resume,
         detector=detector,
@@ -162,14 +170,14 @@ def simulate(
         allow_overlap=allow_overlap,
         dump_fclib=dump_fclib,
         dump_hardest=dump_hardest,
-        signals=tuple(signals),
+        signals=_listed("signals", signals),
         contact_points=contact_points,
         scripts=scripts,
         plugin_timeout=plugin_timeout,
         progress=progress,
         notify=notify,
         verify=verify,
-        sensitivity=tuple(sensitivity),
+        sensitivity=_listed("sensitivity", sensitivity),
         source=None if isinstance(model, Model) else model,
     )
     if verify not in (False, True, "full"):
