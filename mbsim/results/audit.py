@@ -126,6 +126,9 @@ ENTRIES = (
 ENERGIES = ("energy", "energy_step")
 #: A balance that is off by more than this part of the largest energy is told whatever explains it.
 COARSE = 0.02
+#: A contact that gave this part of the largest energy there was, beyond what it took, feeds motion
+#: if that is more than this part of what errors of all steps may make, which is large at rest.
+FEEDS, FEEDS_ERRORS = 0.3, 0.2
 
 #: What is said of overlaps whose force cannot be trusted.
 TOO_DEEP = (
@@ -238,9 +241,10 @@ def audit_of(system: System, left: float, left_time: float) -> Audit | None:
     # of a model that stands still no energy is large: what its scales say is
     usual = max(size, float(tally[codes.USUAL_ENERGY]))
     part = balance / usual if usual > 0.0 else 0.0
-    if part > COARSE and not any(
-        entries[name].excess > 1.0 for name in ENERGIES if name in entries
-    ):
+    open_already = any(entries[name].excess > 1.0 for name in ENERGIES if name in entries)
+    feeding = _feeding(system, shares, size, usual, unit)
+    warnings += feeding
+    if part > COARSE and not open_already and not feeding:
         why = f"tol {kept.plan[codes.AUDIT_TOL]:g} explains: choose a smaller one"
         if "step_end" in entries:
             why = "the deck's step explains: choose a shorter one"
@@ -249,6 +253,34 @@ def audit_of(system: System, left: float, left_time: float) -> Audit | None:
             f"energy of {usual:.3g} {unit}, at time {time:.9g}, as {why}"
         )
     return Audit(balance, size, time, unit, entries, shares, tuple(warnings))
+
+
+def _feeding(
+    system: System, shares: Mapping[int | None, Share], size: float, usual: float, unit: str
+) -> list[str]:
+    """Return what is said of contacts that gave much more than they took.
+
+    Of a force without a potential that is so however small tol is, and where all is nearly at rest
+    it is a small part of the usual energy: what rocks on such a contact may never come to rest.
+    """
+    kept = system.scene.audit
+    tol, steps = float(kept.plan[codes.AUDIT_TOL]), float(kept.tally[codes.STEPS_ALL])
+    explained = (
+        FEEDS_ERRORS * usual * (float(kept.tally[codes.ERRORS_ALL]) + tol * math.sqrt(steps))
+    )
+    said = []
+    for id, share in shares.items():
+        if id is None or not share.change > max(FEEDS * size, explained):
+            continue
+        who = element_name(system.model.file, "Force_Contact", id)
+        part = 100.0 * share.change / size
+        said.append(
+            f"{who} gave {share.change:.2g} {unit} more than it took, {part:.2g} % of the largest "
+            f"energy in the run, most of it at time {share.time:.9g}: forces on "
+            'meshes that are not convex have no potential; contact_depth="FIELD" has one, more '
+            "damping hides it"
+        )
+    return said
 
 
 def _graphic_name(system: System, row: int) -> str:
