@@ -168,10 +168,18 @@ def _failure(system: System, found: Balance, t: float) -> str:
         why = f"nothing holds {name} against the force on it"
     else:
         why = f"the largest is on {name}"
-    return (
+    said = (
         f"no static equilibrium found at time {t:.9g} in {found.iterations} iterations: "
         f"{_share(found)}; {why}"
     )
+    rubs = [id for id, c in system.model.contacts.items() if c.cff_type != "COULOMB_OFF"]
+    if rubs:
+        who = element_name(system.model.file, "Force_Contact", rubs[0])
+        said += (
+            f"; friction, as {who} has, does nothing in a Static: where friction alone keeps "
+            "bodies from sliding off let a Transient bring them to rest"
+        )
+    return said
 
 
 def balance_bodies(

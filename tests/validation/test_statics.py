@@ -258,6 +258,18 @@ def test_box_on_a_slope_finds_no_rest(tmp_path):
         run(tmp_path, GROUND + box(2, 0.1) + contact(1, 200, 100) + slope)
 
 
+def test_what_only_friction_holds_is_said_to_be_so(tmp_path):
+    """A box beside the middle of another one tilts it and slides off; with friction it rests."""
+    rubs = 'cff_type="COULOMB_ON" mu_static="0.3" mu_dynamic="0.3" stiction_trans_vel="0.01"'
+    deck = GROUND + box(2, 0.1) + box(3, 0.3, x=0.03) + GRAVITY
+    for more, said in ((f'{rubs} friction_trans_vel="0.02"', "Force_Contact[1]"), ("", "")):
+        pairs = contact(1, 200, 100, more=more) + contact(2, 300, 200, more=more)
+        with pytest.raises(SolverError) as raised:
+            run(tmp_path, deck + pairs)
+        assert ("friction alone" in str(raised.value)) == bool(said)
+        assert said in str(raised.value)
+
+
 def held(expr, states):
     """Return a sphere of 2 kg that a force along z of ground holds, with states."""
     return f"""{EARTH}{sphere(-0.9, mass=2.0)}{GRAVITY}{states}
