@@ -202,23 +202,33 @@ def deepest_place(points: F2, count: int, p: V3, least: float) -> V3:
 
 
 @jitable
-def share_with_one(
-    points: F2, count: int, part: float, crossed: bool, f: float, p: V3, n: V3
-) -> None:
-    """Leave a part of the force to the first `count` rows, the rest to one point p, the next row.
+def shared(points: F2, first: int, last: int, part: float, crossed: bool, f: float) -> float:
+    """Give rows their part of the force; return what they carry of it.
 
-    No row is deeper than f, the least overlap. Rows that carry less than one point would leave the
-    rest to it as well, unless they have a point where lines cross (`crossed`).
+    No row is deeper than f, the least overlap. Rows that carry less than one point leave the rest
+    to it, unless they have a point where lines cross (`crossed`).
     """
     carried = 0.0
-    for row in range(count):
+    for row in range(first, last):
         points[row, AT_DEPTH] = min(points[row, AT_DEPTH], f)
         carried += points[row, AT_WEIGHT] * max(0.0, points[row, AT_DEPTH]) / f
     part = max(0.0, part) if crossed else max(0.0, part) * fade(2.0 * carried - 1.0)
-    for row in range(count):
+    for row in range(first, last):
         points[row, AT_WEIGHT] *= part
         if points[row, AT_WEIGHT] <= SMALL:
             points[row, AT_DEPTH], points[row, AT_WEIGHT] = min(points[row, AT_DEPTH], -f), 1.0
+    return part
+
+
+@jitable
+def share_with_one(
+    points: F2, count: int, part: float, crossed: bool, f: float, p: V3, n: V3
+) -> None:
+    """Leave a part of the force to the first `count` rows (see `shared`), the rest to one point p.
+
+    That is the next row.
+    """
+    part = shared(points, 0, count, part, crossed, f)
     put_weighted(points[count], f, p, n, 1.0 - part)
 
 

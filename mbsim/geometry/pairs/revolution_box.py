@@ -20,6 +20,7 @@ from mbsim.geometry.convex import (
     shallow,
     slant,
 )
+from mbsim.geometry.face_edges import clip_edge, corner_turn, end_at_corners
 from mbsim.geometry.manifold import (
     ARC_ROWS,
     TURN,
@@ -34,8 +35,8 @@ from mbsim.geometry.manifold import (
     put_weighted,
     segment_on_disc,
     share_with_one,
+    shared,
     side_faces,
-    turn_of,
 )
 from mbsim.geometry.pairs.revolution import cylinder_size
 from mbsim.geometry.region import cylinder_on_rectangle, disc_on_rectangle
@@ -52,8 +53,10 @@ from mbsim.geometry.rotor import (
 )
 
 #: Rows: of an end disc 6 for the rim, then 2 for each edge of the face (where it enters the disc,
-#: or its corner; where it leaves); of a line its bottom and top end and a crossing; one point.
-BOX_ROWS = ARC_ROWS + 9
+#: or its corner; where it leaves), then both ends of an edge that it lies on; of a line its bottom
+#: and top end and a crossing; one point.
+AT_EDGE = ARC_ROWS + 8
+BOX_ROWS = AT_EDGE + 3
 #: Farther from where all of an edge, an end or a side is farthest one point is.
 SINGLE = 1e-8
 
@@ -125,47 +128,6 @@ def face_corner(j: Shape, k: int, sk: float, quarter: int) -> V3:
 
 
 @jitable
-def clip_edge(row: F1, ax: float, ay: float, bx: float, by: float, r: float) -> int:
-    """Cut one edge a-b of the face with the circle of radius r around 0.
-
-    Writes into `row` enter x, y, leave x, y, on circle there (0/1 each), and returns
-    1 if some of it is within, 0 if not, -1 if the circle lies beyond the edge.
-    """
-    tx, ty = bx - ax, by - ay
-    length = math.sqrt(tx * tx + ty * ty)
-    tx, ty = tx / length, ty / length
-    # distance of the line in front of the circle's centre
-    h = ax * ty - ay * tx
-    if h <= -r:
-        return -1
-    if h >= r:
-        return 0
-    half = math.sqrt(r * r - h * h)
-    foot = -(ax * tx + ay * ty)
-    low, high = max(0.0, foot - half), min(length, foot + half)
-    if low >= high:
-        return 0 if h > 0.0 else -1
-    row[0], row[1] = ax + low * tx, ay + low * ty
-    row[2], row[3] = ax + high * tx, ay + high * ty
-    row[4] = 1.0 if foot - half > 0.0 else 0.0
-    row[5] = 1.0 if foot + half < length else 0.0
-    return 1
-
-
-@jitable
-def end_at_corners(work: F2) -> None:
-    """Let a cut edge enter or leave the disc at its corner where the edge beyond is not cut.
-
-    That is a corner on the circle, whose other edge only touches it.
-    """
-    for e in range(4):
-        if work[2 * e, 7] == 1.0 and work[2 * ((e + 1) % 4), 7] == 0.0:
-            work[2 * e, 5] = 1.0
-        if work[2 * e, 7] == 1.0 and work[2 * ((e + 3) % 4), 7] == 0.0:
-            work[2 * e, 4] = 1.0
-
-
-@jitable
 def put_corners(work: F2, disc: Disc, n: V3, weight: float) -> None:
     """Turn the cut edges in the rows of `work` into points where they enter and leave the disc."""
     centre, u, v, r, depth0, rise = disc
@@ -173,21 +135,11 @@ def put_corners(work: F2, disc: Disc, n: V3, weight: float) -> None:
     for e in range(4):
         row = work[2 * e]
         cut = row[7] == 1.0
-        place = (row[0], row[1], row[2], row[3])
-        enters, leaves = row[4] == 1.0, row[5] == 1.0
-        tx, ty = math.cos(turns[e]), math.sin(turns[e])
-        before = turns[e - 1]
+        enters = corner_turn(row, turns[e], turns[e - 1], 0)
+        leaves = corner_turn(row, turns[e], turns[e - 1], 1)
         for side in range(2):
-            x, y = place[2 * side], place[2 * side + 1]
-            if not cut or (side == 1 and not leaves):
-                # where an edge ends within the disc the next one has the corner
-                angle = 0.0
-            elif side == 1:
-                angle = turn_of(tx, ty, -y, x)
-            elif enters:
-                angle = turn_of(-y, x, tx, ty)
-            else:
-                angle = turn_of(math.cos(before), math.sin(before), tx, ty)
+            angle, x, y = enters if side == 0 else leaves
+            angle = angle if cut else 0.0
             put_point(work[2 * e + side], -r, centre, n)
             depth = depth0 + rise * x
             p = add(centre, add(scale(x, u), scale(y, v)))
@@ -245,7 +197,7 @@ def disc_on_face(i: Shape, j: Shape, end: int, k: int, n: V3, f: float, points: 
             beyond = True
     if cuts == 0 and (beyond or not inside):
         return -1.0
-    end_at_corners(work)
+    end_at_corners(work, 4)
 
     # arcs from where one edge leaves to where the next enters, into rows 2 e + 1
     arcs = work[1::2]
@@ -369,6 +321,23 @@ def side_on_edge(
 
 
 @jitable
+def end_on_edge(
+    i: Shape, j: Shape, end: int, axes: tuple[int, int, int], n: V3, f: float, points: F2
+) -> float:
+    """Write the ends of the part of the box's edge that faces an end of I and lies over it.
+
+    Returns the part of the force that they carry, -1 where nothing lies over it.
+    """
+    centre, o, r = end_disc(i, end)
+    q = j[1]
+    for h in axes[:2]:
+        a = edge_axis(j, h)
+        q = add(q, scale(j[5][h] if dot(a, n) >= 0.0 else -j[5][h], a))
+    e = scale(j[5][axes[2]], edge_axis(j, axes[2]))
+    return segment_on_disc(points, 0, sub(q, e), add(q, e), (centre, r), o, n, 1.0, f)
+
+
+@jitable
 def solid_on_box(i: Shape, j: Shape, points: F2) -> int:
     """Write the points of a solid of revolution I on a box J."""
     f, n = least(i, j)
@@ -381,30 +350,30 @@ def solid_on_box(i: Shape, j: Shape, points: F2) -> int:
     k = axes[0]
     end = end_facing(i, scale(-1.0, n))
     on_face = abs(dot(edge_axis(j, k), n)) > math.sqrt(0.5)
-    crossed = end == 0 and not on_face
-    if end != 0 and on_face:
-        part = disc_on_face(i, j, end, k, n, f, points)
+    part, crossed, lies = -1.0, end == 0 and not on_face, 0.0
+    if end != 0:
+        if on_face:
+            part = disc_on_face(i, j, end, k, n, f, points)
+        part = shared(points, 0, AT_EDGE, part, False, f)
+        # what lies on a face is on none of its edges
+        lies = (1.0 - part) * max(0.0, end_on_edge(i, j, end, axes, n, f, points[AT_EDGE:]))
+        lies = shared(points, AT_EDGE, BOX_ROWS - 1, lies, False, f)
     elif on_face:
         part = line_on_face(i, j, k, n, f, points)
         if part < 0.0:
             # it leaves the face where it crosses an edge
             part, crossed = side_on_edge(i, j, axes, n, f, points), True
-    elif end == 0:
-        part = side_on_edge(i, j, axes, n, f, points)
     else:
-        centre, o, r = end_disc(i, end)
-        q = j[1]
-        for h in axes[:2]:
-            a = edge_axis(j, h)
-            q = add(q, scale(j[5][h] if dot(a, n) >= 0.0 else -j[5][h], a))
-        e = scale(j[5][axes[2]], edge_axis(j, axes[2]))
-        part = segment_on_disc(points, 0, sub(q, e), add(q, e), (centre, r), o, n, 1.0, f)
+        part = side_on_edge(i, j, axes, n, f, points)
     p = middle_of_one(i, j, axes, n, f)
     # all of a face, a side or an end is farthest, but for rounding: not there if none is over it
     room = f + ROUNDING * widest(i[5])
     if not (lies_in(i, p, room) and lies_in_box(j, p, room)):
         p = deepest_place(points, BOX_ROWS - 1, p, -NEARLY * widest(i[5]))
-    share_with_one(points, BOX_ROWS - 1, part, crossed, f, p, n)
+    if end == 0:
+        share_with_one(points, BOX_ROWS - 1, part, crossed, f, p, n)
+    else:
+        put_weighted(points[BOX_ROWS - 1], f, p, n, 1.0 - part - lies)
     return BOX_ROWS
 
 
