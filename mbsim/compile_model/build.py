@@ -396,6 +396,7 @@ def build(
     interpret: bool = False,
     detector: str = "auto",
     log: Callable[[str], None] | None = None,
+    rigid: bool = False,
 ) -> System:
     """Return the model as arrays, ready to be integrated.
 
@@ -409,6 +410,8 @@ def build(
     detector : {"auto", "fcl"}
     log : callable, optional
         Takes lines for the run's log: what users' scripts print or say.
+    rigid : bool
+        Whether the method that runs it has rigid contact.
 
     Raises
     ------
@@ -416,13 +419,13 @@ def build(
         If a user subroutine cannot be found or loaded, or a pair of shapes is impossible.
     """
     placement = place(model)
-    plans = plan_pairs(model, detector)
+    plans = plan_pairs(model, detector, rigid)
     code = load_user_code(model, plugins, interpret, log)
     rows = body_rows(model, placement)
     contacts = contact_tables(model, placement, plans, rows, code.friction, code.normal)
     judged = _judged(model, placement)
     table = MarkerTable(placement, rows, judged.length)
-    rigid = rigid_slots(model, plans, contacts.pairs, contacts.graphics, table)
+    sticking = rigid_slots(model, plans, contacts.pairs, contacts.graphics, table)
     acts = acting(
         model,
         table,
@@ -430,7 +433,7 @@ def build(
         code.subroutines,
         code.looks,
         residuals=code.residuals,
-        rigid_slots=rigid,
+        rigid_slots=sticking,
         surfaces=code.surfaces,
     )
     scene, y0 = _scene(model, placement, plans, code, contacts, judged, table, acts)

@@ -71,7 +71,8 @@ def kernel_address(kind: Kind) -> int:
         return 0
     if kind.region:
         return region_address(kind.closed_form)
-    return pair_address(PAIRS[kind.closed_form])
+    assert kind.form is not None
+    return pair_address(kind.form)
 
 
 def pair_address(pair: Pair) -> int:

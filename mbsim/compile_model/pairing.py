@@ -11,11 +11,12 @@ from __future__ import annotations
 import hashlib
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from mbsim.errors import DeckError, Fault
-from mbsim.geometry.catalog import PAIRS, REGION_ROWS, REGIONS
+from mbsim.geometry.catalog import PAIRS, REGION_ROWS, REGIONS, RIGID_PAIRS, Pair
 from mbsim.geometry.polyhedron import CUBE, HULL_SLOTS, MOST_EDGE_PAIRS, MOST_EDGES, hull_slots
 from mbsim.model import hull
 from mbsim.model.elements import Contact, Graphic, Model
@@ -54,16 +55,24 @@ class Kind:
     closed_form: str  # name in PAIRS, or empty where FCL does it
     slots: int
     region: bool = False  # whether its points are summed up to one incident
+    rigid: bool = False  # whether it has the points of rigid contact, in RIGID_PAIRS
+
+    @property
+    def form(self) -> Pair | None:
+        """What gives its points, None where FCL does."""
+        if not self.closed_form:
+            return None
+        return (RIGID_PAIRS if self.rigid else PAIRS)[self.closed_form]
 
     @property
     def has_area(self) -> bool:
         """Whether its incidents have an area."""
-        return self.region or (bool(self.closed_form) and PAIRS[self.closed_form].patches)
+        return self.region or (self.form is not None and self.form.patches)
 
     @property
     def rims(self) -> bool:
         """Whether each three of its rows are of one rim."""
-        return bool(self.closed_form) and not self.region and PAIRS[self.closed_form].rims
+        return self.form is not None and not self.region and self.form.rims
 
     @property
     def moves(self) -> bool:
@@ -87,7 +96,7 @@ class Kind:
         if self.closed_form == "MESH-PLANE" and self.slots == hull.MOST_ROWS:
             # of a fine mesh the deepest corner has the force alone, and the next one takes it over
             return True
-        return not self.closed_form or PAIRS[self.closed_form].regroups
+        return self.form is None or self.form.regroups
 
     @property
     def detector(self) -> str:
@@ -105,6 +114,13 @@ class Kind:
             "FCL, one point: what rests on a flat end may tip, and is n^(1/exponent) times as deep "
             f"as on the n = {points} points of the closed form"
         )
+
+
+class Detection(NamedTuple):
+    """How a run tests its pairs: see `plan_pairs`."""
+
+    detector: str
+    rigid: bool
 
 
 @dataclass(frozen=True)
@@ -198,22 +214,31 @@ def _kind(contact: int, i: Graphic, j: Graphic, detector: str) -> Kind:
     return patches or Kind(contact, i.shape, j.shape, False, "", fcl_slots)
 
 
+def _as_rigid(kind: Kind) -> Kind:
+    """Return a kind with the points that its rigid contact has, where those are others."""
+    if kind.closed_form not in RIGID_PAIRS:
+        return kind
+    return replace(kind, slots=RIGID_PAIRS[kind.closed_form].slots, rigid=True)
+
+
 def _kind_of(
-    model: Model, contact: Contact, i: Graphic, j: Graphic, detector: str, faults: list[Fault]
+    model: Model, contact: Contact, i: Graphic, j: Graphic, by: Detection, faults: list[Fault]
 ) -> Kind:
     """Return how graphics like these two are tested in a contact; say what it cannot have."""
+    detector = by.detector
     if contact.contact_depth != "FIELD":
         usual = _kind(contact.id, i, j, detector)
-        return _one_region(model, contact, i, j, usual, faults)
+        found = _one_region(model, contact, i, j, usual, faults)
+        return _as_rigid(found) if by.rigid else found
     kind = _patches(contact.id, i, j, AS_FIELD)
     if kind is not None and detector != "fcl":
         return kind
     why = "is measured without FCL; leave out --detector"
     if kind is None:
         why = f"has no field of depth ({i.shape} on {j.shape}); give what is round as a mesh"
-    by = 'cnf_type="VOLUME"' if contact.cnf_type == "VOLUME" else 'contact_depth="FIELD"'
+    told = 'cnf_type="VOLUME"' if contact.cnf_type == "VOLUME" else 'contact_depth="FIELD"'
     where = f"Force_Contact[{contact.id}]"
-    message = f"{by}: Post_Graphic[{i.id}] on Post_Graphic[{j.id}] {why}"
+    message = f"{told}: Post_Graphic[{i.id}] on Post_Graphic[{j.id}] {why}"
     faults.append(Fault(model.file, contact.source.line, where, message))
     return Kind(contact.id, i.shape, j.shape, False, "", FCL_SLOTS)
 
@@ -273,7 +298,7 @@ def _two_planes(model: Model, contact: Contact, i: int, j: int) -> Fault:
 
 
 def _contact_set(
-    model: Model, contact: Contact, same: bool, detector: str
+    model: Model, contact: Contact, same: bool, by: Detection
 ) -> tuple[BroadphasePlan, list[Fault]]:
     """Return a contact of many graphics, and what is wrong with it."""
     kinds: dict[tuple[str, str], Kind] = {}
@@ -291,11 +316,11 @@ def _contact_set(
                 faults.append(_two_planes(model, contact, i, j))
             elif (shape_j, shape_i) not in kinds or not same:
                 a, b = model.graphics[i], model.graphics[j]
-                kinds[shape_i, shape_j] = _kind_of(model, contact, a, b, detector, faults)
+                kinds[shape_i, shape_j] = _kind_of(model, contact, a, b, by, faults)
     return BroadphasePlan(contact.id, i_ids, j_ids, same, kinds), faults
 
 
-def plan_pairs(model: Model, detector: str = "auto") -> Plans:
+def plan_pairs(model: Model, detector: str = "auto", rigid: bool = False) -> Plans:
     """Return every I graphic with every J graphic of every contact.
 
     Parameters
@@ -303,6 +328,8 @@ def plan_pairs(model: Model, detector: str = "auto") -> Plans:
     model : Model
     detector : {"auto", "fcl"}
         "fcl" sends all pairs through FCL.
+    rigid : bool
+        Whether the method that runs it has rigid contact: pairs then have its points.
 
     Raises
     ------
@@ -310,13 +337,14 @@ def plan_pairs(model: Model, detector: str = "auto") -> Plans:
         If two shapes cannot be tested against each other (two planes), or have no area that is
         known where the contact asks for it.
     """
+    by = Detection(detector, rigid)
     pairs, broadphase, faults = [], [], []
     for contact in model.contacts.values():
         i_ids, j_ids = contact.i_graphics_id, contact.j_graphics_id
         same = contact.with_itself
         many = len(i_ids) * (len(i_ids) - 1) // 2 if same else len(i_ids) * len(j_ids)
         if many > MOST_LISTED:
-            contact_set, wrong = _contact_set(model, contact, same, detector)
+            contact_set, wrong = _contact_set(model, contact, same, by)
             broadphase.append(contact_set)
             faults += wrong
             continue
@@ -331,7 +359,7 @@ def plan_pairs(model: Model, detector: str = "auto") -> Plans:
                 if a.shape == b.shape == "PLANE":
                     faults.append(_two_planes(model, contact, i, j))
                     continue
-                kind = _kind_of(model, contact, a, b, detector, faults)
+                kind = _kind_of(model, contact, a, b, by, faults)
                 pairs.append(PairPlan(kind, j, i) if kind.swapped else PairPlan(kind, i, j))
     if faults:
         raise DeckError(faults)

@@ -26,6 +26,7 @@ does not know the depth of an overlap as deep as this one returns less the numbe
 A pair that meets in areas has also ``region(frame_i, size_i, frame_j, size_j, points) -> count,
 area``, which writes the same rows and returns beside their number the area of contact, seen along
 the normal; it is in a second registry. A third one has the motion bounds of pairs with meshes.
+A fourth one has the points of pairs of which rigid contact has others than compliant contact.
 """
 
 from __future__ import annotations
@@ -79,6 +80,8 @@ Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 PAIRS: Registry[Pair] = Registry("mbsim.geometry.pairs")
 NEARS: Registry[Callable[..., int]] = Registry("mbsim.geometry.pairs")
 REGIONS: Registry[Region] = Registry("mbsim.geometry.pairs")
+#: Pairs whose rigid contact has other points than their compliant one.
+RIGID_PAIRS: Registry[Pair] = Registry("mbsim.geometry.pairs")
 MOTION_BOUNDS: Registry[Callable[..., int]] = Registry("mbsim.geometry.pairs")
 
 
@@ -119,6 +122,20 @@ def near_pair(shape_i: str, shape_j: str) -> Callable[[Kernel], Kernel]:
 
     def register(points: Kernel) -> Kernel:
         NEARS.put(f"{shape_i}-{shape_j}", jitable(points))
+        return points
+
+    return register
+
+
+def rigid_pair(shape_i: str, shape_j: str, slots: int) -> Callable[[Kernel], Kernel]:
+    """Register the decorated function as the pair's points where contact is rigid.
+
+    Rigid contact needs all points that hold a body, and no energy whose slope its forces are.
+    """
+
+    def register(points: Kernel) -> Kernel:
+        name = f"{shape_i}-{shape_j}"
+        RIGID_PAIRS.put(name, Pair(name, jitable(points), slots, regroups=True))
         return points
 
     return register

@@ -24,7 +24,8 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, any_tangent, cross, dot, norm, scale, sub, vector
 from mbsim.geometry.catalog import axis
 
-BOX, ROTOR, ELLIPSOID = 0, 1, 2
+#: A crowned solid of revolution is one that bulges (`geometry.crowned`).
+BOX, ROTOR, ELLIPSOID, CROWNED = 0, 1, 2, 3
 
 Shape = tuple[int, V3, V3, V3, V3, V3]
 

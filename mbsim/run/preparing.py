@@ -10,6 +10,7 @@ from mbsim import __version__
 from mbsim.arrays.codes import SCALE_LENGTH
 from mbsim.core.profile import part
 from mbsim.errors import ModelError
+from mbsim.integrators.catalog import RIGID
 from mbsim.model.elements import Model
 from mbsim.run.options import Notify
 from mbsim.run.plants import with_plants
@@ -83,7 +84,14 @@ def prepare(
     check_plugins(files)
     said: list[str] = []
     with no_scripts(not scripts), part("build"):
-        system = build(with_plants(model), files, interpret, detector, said.append)
+        system = build(
+            with_plants(model),
+            files,
+            interpret,
+            detector,
+            said.append,
+            rigid=settings.integrator == RIGID,
+        )
     changes = _parameters(system, settings)
     said += _announce(system, settings, said, tell)
     said += _unused(system, files, tell)

@@ -260,22 +260,6 @@ def _is_patch(kind: Kind) -> bool:
     return kind.has_area and not kind.region
 
 
-#: Shapes that touch at one point whatever they lie on.
-_ROUND = ("SPHERE", "ELLIPSOID")
-
-
-def _rocking(system: System) -> list[str]:
-    """Return what is to be said of pairs that have one point where they may lie flat."""
-    said: dict[str, None] = {}
-    for kind in system.plans.kinds:
-        if kind.slots == 1 and kind.shape_i not in _ROUND and kind.shape_j not in _ROUND:
-            said[
-                f"Force_Contact[{kind.contact}]: {kind.shape_i} on {kind.shape_j} touches at one "
-                "point: what lies flat there is not kept from rocking"
-            ] = None
-    return list(said)
-
-
 def _refuse_reactions(system: System) -> None:
     """Raise if a force looks at reactions while there are contacts, whose impulses do not show."""
     scene, model = system.scene, system.model
@@ -310,7 +294,6 @@ def rigid_mechanism(system: System, fixed: bool, tol: float) -> Made:
             )
     _refuse_reactions(system)
     found = Coefficients(system)
-    found.said += _rocking(system)
     depends = find_depends(scene)
     coupled = _changing_forces(scene, depends)
     nb = len(scene.bodies.mass)

@@ -99,7 +99,7 @@ def _pairs() -> Iterator[Task]:
         pair_address,
         region_address,
     )
-    from mbsim.geometry.catalog import MOTION_BOUNDS, NEARS, PAIRS, REGIONS
+    from mbsim.geometry.catalog import MOTION_BOUNDS, NEARS, PAIRS, REGIONS, RIGID_PAIRS
 
     for name in PAIRS:
         yield Task(name, functools.partial(pair_address, PAIRS[name]))
@@ -108,6 +108,8 @@ def _pairs() -> Iterator[Task]:
     for name in NEARS:
         rows = PAIRS[name].slots
         yield Task(f"{name} apart", functools.partial(near_address, name, rows))
+    for name in RIGID_PAIRS:
+        yield Task(f"{name} rigid", functools.partial(pair_address, RIGID_PAIRS[name]))
     for name in MOTION_BOUNDS:
         yield Task(f"{name} motion bound", functools.partial(motion_bound_address, name))
 

@@ -84,6 +84,9 @@ def moved(results: Results, count: int) -> float:
         ["box", "cylinder"] * 3,
         ["prism", "box"] * 3,
         ["disc"] * 6,
+        ["prism", "cylinder"] * 3,
+        ["cylinder", "prism"] * 3,
+        ["prism", "frustum", "prism"],
     ],
     ids="-".join,
 )
@@ -145,18 +148,29 @@ def test_a_train_of_cylinders_stays_in_line(h: float) -> None:
     assert np.median(turns) < 5e-3
 
 
+def slab(folder: Path, kind: str, sides: tuple[float, float, float]) -> str:
+    """Return a slab of ground whose top is at z = 0, as a box or as a convex mesh."""
+    if kind == "box":
+        names = ("length_x", "length_y", "length_z")
+        given = text.attributes(**dict(zip(names, sides, strict=True)))
+        graphic = f'type="BoxDefinedFromCenter" center_marker_id="15" {given}'
+    else:
+        trimesh.creation.box(sides).export(folder / "slab.stl")
+        graphic = 'type="TriaMesh" rm_id="15" file="slab.stl"'
+    return text.marker(15, 1, (0.0, 0.0, -0.5 * sides[2])) + f'<Post_Graphic id="105" {graphic}/>'
+
+
+@pytest.mark.parametrize("kind", ["box", "mesh"])
 @pytest.mark.parametrize(("h", "tol", "allowed"), [(2e-3, 1e-3, 5e-5), (None, 1e-5, 1e-5)])
-def test_a_cylinder_rolls_down_a_box(
-    tmp_path: Path, h: float | None, tol: float, allowed: float
+def test_a_cylinder_rolls_down_a_slab(
+    tmp_path: Path, h: float | None, tol: float, allowed: float, kind: str
 ) -> None:
     """A solid cylinder that rolls is accelerated by 2/3 of what pulls along the slope."""
     radius, length, tilt = 0.1, 0.3, 0.2
     along, across = radius**2 / 2.0, radius**2 / 4.0 + length**2 / 12.0
     size = text.attributes(type="Cylinder", radius=radius, length=length)
-    sides = text.attributes(length_x=20.0, length_y=4.0, length_z=1.0)
     parts = [
-        text.marker(15, 1, (0.0, 0.0, -0.5)),
-        f'<Post_Graphic id="105" type="BoxDefinedFromCenter" center_marker_id="15" {sides}/>',
+        slab(tmp_path, kind, (20.0, 4.0, 1.0)),
         text.body(2, 1.0, (across, along, across), (0.0, 0.0, radius)),
         text.marker(21, 2, (0.0, -length / 2.0, radius), ALONG_Y),
         f'<Post_Graphic id="200" center_marker_id="21" {size}/>',
@@ -169,15 +183,48 @@ def test_a_cylinder_rolls_down_a_box(
     assert np.abs(way[1:] - (0.0, radius)).max() < 1e-7
 
 
-@pytest.mark.parametrize(
-    ("kinds", "rocks"), [(["prism", "cylinder"], True), (["prism"] * 2, False)]
-)
-def test_the_log_says_what_is_not_kept_from_rocking(
-    tmp_path: Path, kinds: list[str], rocks: bool
+@pytest.mark.parametrize("kind", ["box", "mesh"])
+@pytest.mark.parametrize(("over", "holds"), [(0.095, True), (0.105, False)])
+def test_a_cylinder_over_an_edge_stands_or_falls(
+    tmp_path: Path, kind: str, over: float, holds: bool
 ) -> None:
-    """An end of a cylinder on a convex mesh is one point: whoever stands there may fall."""
-    stack(tmp_path, kinds, 1.0, 1e-2)
-    deck = str(tmp_path / "rigid.xml")
-    mbsim.simulate(deck, integrator="MOREAU", end_time=0.01, output=tmp_path / "out")
-    (log,) = (tmp_path / "out").glob("*.log")
-    assert ("not kept from rocking" in log.read_text(encoding="utf-8")) == rocks
+    """Its end lies on a slab 0.2 wide: what is over the edge may be just less than a half."""
+    radius, height = 0.2, 0.1
+    size = text.attributes(type="Cylinder", radius=radius, length=height)
+    turns = (radius**2 / 4.0 + height**2 / 12.0,) * 2 + (radius**2 / 2.0,)
+    parts = [
+        slab(tmp_path, kind, (0.2, 1.0, 0.5)),
+        text.body(2, 1.0, turns, (over, 0.0, 0.5 * height)),
+        text.marker(21, 2, (over, 0.0, 0.0)),
+        f'<Post_Graphic id="200" center_marker_id="21" {size}/>',
+        text.contact(301, [200], [105], **decks.rubbed(0.5)),
+        text.gravity(),
+    ]
+    results = mbsim.simulate(decks.model(tmp_path, parts, 1.0, 2e-3), integrator="MOREAU")
+    assert (moved(results, 1) < 1e-4 * radius) == holds
+
+
+@pytest.mark.parametrize("sections", [5, 12, 13, 64])
+@pytest.mark.parametrize("shape", ["cylinder", "frustum"])
+def test_an_end_on_a_prism_stands(tmp_path: Path, sections: int, shape: str) -> None:
+    """A prism of any number of corners under an end that is wider, or as wide."""
+    trimesh.creation.cylinder(radius=0.1, height=0.3, sections=sections).export(
+        tmp_path / "prism.stl"
+    )
+    for radius in (0.1, 0.15):
+        if shape == "cylinder":
+            size = text.attributes(type="Cylinder", radius=radius, length=0.2)
+        else:
+            sizes = {"bottom_radius": radius, "top_radius": 0.05, "length": 0.2}
+            size = text.attributes(type="Frustum", **sizes)
+        parts = [
+            text.marker(15, 1, (0.0, 0.0, -0.15)),
+            '<Post_Graphic id="105" type="TriaMesh" rm_id="15" file="prism.stl"/>',
+            text.body(2, 1.0, (0.01, 0.01, 0.01), (0.05, 0.0, 0.1)),
+            text.marker(21, 2, (0.05, 0.0, 0.0)),
+            f'<Post_Graphic id="200" center_marker_id="21" {size}/>',
+            text.contact(301, [200], [105], **decks.rubbed(0.5)),
+            text.gravity(),
+        ]
+        results = mbsim.simulate(decks.model(tmp_path, parts, 0.5, 5e-3), integrator="MOREAU")
+        assert moved(results, 1) < 1e-4 * radius

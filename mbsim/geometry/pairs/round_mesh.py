@@ -22,11 +22,20 @@ from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
 from mbsim.core.rotation import add, cross, dot, norm, scale, sub, vector
 from mbsim.geometry.catalog import axis, pair, put_point
-from mbsim.geometry.convex import BOX, ELLIPSOID, ROTOR, Shape, between_round, far
+from mbsim.geometry.convex import (
+    BOX,
+    CROWNED,
+    ELLIPSOID,
+    Shape,
+    between_round,
+    far,
+    point_in_solid,
+)
 from mbsim.geometry.crowned import bulge, far_crowned, outside, ways_out
 from mbsim.geometry.mesh.merging import to_local
 from mbsim.geometry.pairs.revolution import cylinder_size
 from mbsim.geometry.polyhedron import corner, plane, to_global
+from mbsim.geometry.rotor import lies_in, side_distance
 from mbsim.model.hull import (
     AT_CORNERS,
     AT_EDGES,
@@ -55,13 +64,13 @@ Way = tuple[float, V3]
 def lowest(solid: Shape, n: V3) -> V3:
     """Return the point of the solid that is lowest along n."""
     down = scale(-1.0, n)
-    return far_crowned(solid, down) if solid[0] == ROTOR else far(solid, down)
+    return far_crowned(solid, down) if solid[0] == CROWNED else far(solid, down)
 
 
 @jitable
 def beyond(solid: Shape, p: V3) -> float:
     """Return how far the solid's surface, as it is taken here, is outside of its point p."""
-    return bulge(solid, p) if solid[0] == ROTOR else 0.0
+    return bulge(solid, p) if solid[0] == CROWNED else 0.0
 
 
 @jitable
@@ -185,6 +194,29 @@ def at_rotor(hull: F1, solid: Shape, best: Way) -> Way:
 
 
 @jitable
+def at_side(hull: F1, solid: Shape, best: Way) -> Way:
+    """Return the better of what is known and the least overlap of corners with a straight side.
+
+    Of the corners outside the nearest one alone may part the shapes.
+    """
+    nearest, least = -1, math.inf
+    for k in range(int(hull[CORNERS])):
+        p = corner(hull, k)
+        if lies_in(solid, p, 0.0):
+            n = scale(-1.0, side_distance(solid, p)[1])
+            best = better(solid, high_corner(hull, n), n, best)
+            continue
+        distance = point_in_solid(solid[1], solid[4], solid[5], p)[0]
+        if distance < least:
+            nearest, least = k, distance
+    if nearest >= 0:
+        p = corner(hull, nearest)
+        n = scale(-1.0, point_in_solid(solid[1], solid[4], solid[5], p)[1])
+        best = better(solid, high_corner(hull, n), n, best)
+    return best
+
+
+@jitable
 def unit_ball(solid: Shape, p: V3) -> V3:
     """Return a point where the ellipsoid is the unit ball."""
     d, size = sub(p, solid[1]), solid[5]
@@ -232,13 +264,16 @@ def least_overlap(hull: F1, solid: Shape) -> Way:
                size[2]))  # fmt: skip
     if f < 0.0 or (f < SHALLOW * thin and lies_over(hull, face, lowest(solid, n), f)):
         return best
-    if solid[0] == ROTOR:
+    if solid[0] == ELLIPSOID:
+        best = at_corners(hull, solid, best)
+    else:
         for k in range(2):
             m = scale(1.0 - 2.0 * k, solid[4])
             best = better(solid, high_corner(hull, m), m, best)
-        best = at_rotor(hull, solid, best)
-    else:
-        best = at_corners(hull, solid, best)
+        if solid[0] == CROWNED:
+            best = at_rotor(hull, solid, best)
+        else:
+            best = at_side(hull, solid, best)
     if best[0] < 0.0:
         return best
     at = int(hull[AT_EDGES])
@@ -268,13 +303,13 @@ def round_on_hull(kind: int, frame_i: F1, size: V3, frame_j: F1, size_j: F1, poi
 @pair("CYLINDER", "MESH", slots=1)
 def cylinder_mesh(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """The direction of least overlap with a convex mesh."""
-    return round_on_hull(ROTOR, frame_i, cylinder_size(size_i), frame_j, size_j, points)
+    return round_on_hull(CROWNED, frame_i, cylinder_size(size_i), frame_j, size_j, points)
 
 
 @pair("FRUSTUM", "MESH", slots=1)
 def frustum_mesh(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> int:
     """The direction of least overlap with a convex mesh."""
-    return round_on_hull(ROTOR, frame_i, vector(size_i), frame_j, size_j, points)
+    return round_on_hull(CROWNED, frame_i, vector(size_i), frame_j, size_j, points)
 
 
 @pair("ELLIPSOID", "MESH", slots=1)
