@@ -113,7 +113,9 @@ PAIR_VALUE, PAIR_RATE, PAIR_SECOND = range(3)
 #: Results of a user's relation of n terms: its value, then n slopes, then n by n second ones.
 RELATION_VALUE, RELATION_SLOPES = range(2)
 
-# entries of `Sweep.quality`: when equations were chosen last, the largest of those, and whether
+#: How many entries `Sweep.quality` has.
+QUALITIES = 20
+# They are: when equations were chosen last, the largest of those, and whether
 # the committed state is near a position in which a loop can fold; how far the last step left
 # the equations before it was brought back onto them, as a local error, and which equation most;
 # the least pivot of the factor at hand over its size squared, and
@@ -121,7 +123,8 @@ RELATION_VALUE, RELATION_SLOPES = range(2)
 # inertia, times the square root of the least pivot, and that pivot; at the committed state the
 # least pivot and the time; whether a fold is being passed, when that began and when it ends, and
 # until when the next step may go; how far off velocities were behind it, and at which equation;
-# power of motions within it
+# power of motions within it; the largest residual, over its unit, that Newton's method left of what
+# closes loops, and of which equation
 (
     CHOSEN,
     USUAL,
@@ -141,7 +144,9 @@ RELATION_VALUE, RELATION_SLOPES = range(2)
     FOLD_OFF,
     FOLD_AT,
     FOLD_POWER,
-) = range(18)
+    LEFT_OPEN,
+    OPEN_AT,
+) = range(QUALITIES)
 
 # columns of `Sweep.aim`, and entries of `Sweep.aimed`: the begin of a step that asks for rates of
 # equations that hold accelerations, the time for which it does now, and the work that equations did

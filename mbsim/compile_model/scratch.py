@@ -254,7 +254,7 @@ def sweep(mechanism: Mechanism) -> Sweep:
         kept_at=np.zeros(8),
         kept_power=np.zeros(8),
         kept_a=np.zeros((8, nt if ne else 0, 6)),
-        quality=np.zeros(18),
+        quality=np.zeros(codes.QUALITIES),
         stress=np.zeros((ne, 6 * len(mechanism.elements))),
         jet=np.zeros(12),
         pair=np.zeros(3),

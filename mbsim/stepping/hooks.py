@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mbsim.arrays.codes import AIMED_AT, LISTINGS
+from mbsim.arrays.codes import AIMED_AT, AT_FAULT, AUDIT_TOL, LEFT_OPEN, LISTINGS, OPEN_AT
 from mbsim.arrays.hooks import Contacts, Hook, Joints, failure_or
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, vector_at, view
@@ -39,6 +39,9 @@ from mbsim.stepping.step import take_step, want_room
 
 #: How often a step of the deck's length is taken anew, each time with near pairs farther off.
 MOST_TRIES = 4
+#: How often joints are closed again, each time by some rounds of Newton's method, and how far they
+#: may be open then, over tol: the audit warns from there on.
+MOST_CLOSES, OPEN = 16, 10.0
 
 
 @jitable
@@ -159,6 +162,26 @@ def commit(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     return word if code == 0 else -code
 
 
+@jitable
+def close_or_end(scene: Scene, t: float, y: F1) -> int:
+    """Bring y onto joints until they are closed; return 0, or what ends the run where none can.
+
+    Where the deck fixes the step no shorter one is tried, and a motion beyond what a mechanism can
+    reach leaves its joints open by any length.
+    """
+    quality, allowed = scene.sweep.quality, OPEN * scene.audit.plan[AUDIT_TOL]
+    for _ in range(MOST_CLOSES):
+        if quality[LEFT_OPEN] <= allowed:
+            return 0
+        code = bring_to_end(scene, t, y)
+        if code != 0:
+            return code
+    if quality[LEFT_OPEN] <= allowed:
+        return 0
+    scene.work.diagnostics[AT_FAULT] = quality[OPEN_AT]
+    return Code.CONTRADICTION
+
+
 def project(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """Quaternions back to unit length, and bodies onto their constraints by the least change.
 
@@ -170,6 +193,9 @@ def project(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     if scene.world.hooks[Hook.JOINTS] == 0:
         return 0
     code = bring_to_end(scene, t, y) if h > 0.0 else bring_onto_joints(scene, t, y)
+    S = view(scene.world.hooks[Hook.STEPPING], Stepping)
+    if code == 0 and h > 0.0 and S.plan.number[FIXED] == 1.0:
+        code = close_or_end(scene, t, y)
     return failure_or(scene, code)
 
 

@@ -6,7 +6,14 @@ that the tree allows, weighted by inertia; last, velocities are treated likewise
 
 from __future__ import annotations
 
-from mbsim.arrays.codes import DRIFT, DRIFTER, SCALE_LENGTH, SCALE_SPEED
+from mbsim.arrays.codes import (
+    DRIFT,
+    DRIFTER,
+    LEFT_OPEN,
+    OPEN_AT,
+    SCALE_LENGTH,
+    SCALE_SPEED,
+)
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
@@ -129,7 +136,8 @@ def note_drift(scene: Scene, level: int, column: int, part: float) -> None:
 def note_gap(scene: Scene, t: float) -> None:
     """Note as drift, over `SMALL`, a residual that Newton has left: the step is to be refused.
 
-    A motion that asked for more than that of the step keeps its name: it is the cause.
+    Where steps have no error it is in `LEFT_OPEN`. A motion that asked for more than that of the
+    step keeps its name: it is the cause.
     """
     quality = scene.sweep.quality
     asked, worst = quality[DRIFT], 0.0
@@ -139,6 +147,7 @@ def note_gap(scene: Scene, t: float) -> None:
         held = scene.equations.level[e] >= 2 and is_sticking(scene, e, t)
         if held and gap > max(SMALL, worst):
             worst = gap
+            quality[LEFT_OPEN], quality[OPEN_AT] = gap, e
             if asked <= SMALL:
                 quality[DRIFTER] = e
     if worst > 0.0:
@@ -162,6 +171,7 @@ def close_loops(scene: Scene, t: float, y: F1) -> None:
     """
     prepare_equations(scene, t, y)
     note_drift(scene, 2, RESIDUAL, FORGIVEN)
+    scene.sweep.quality[LEFT_OPEN] = 0.0
     factor_equations(scene, t)
     for _ in range(MOST_ROUNDS):
         size = largest_residual(scene, 2, RESIDUAL, t)
