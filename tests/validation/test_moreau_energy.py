@@ -127,3 +127,24 @@ def test_a_belt_drags_with_the_work_of_its_friction(tmp_path: Path, h: float) ->
     assert given[-1] - given[0] == pytest.approx(1.0, rel=0.02)
     assert results["energy/dissipated"][-1] == pytest.approx(0.5, rel=0.02)
     assert results.audit.warnings == ()
+
+
+def test_energy_that_a_coarse_tol_leaves_is_laid_to_the_step(tmp_path: Path) -> None:
+    """A rigid contact has no force without a potential, so that is not what is said of it."""
+    size = text.attributes(type="Cylinder", radius=0.1, length=0.1)
+    turns, graphics, parts = (1.0 / 300.0, 1.0 / 300.0, 0.005), [], [text.gravity()]
+    for k in range(6):
+        number, foot = 2 + k, (0.002 * k, 0.0, 0.1 * k)
+        graphics.append(100 * number)
+        parts += [
+            text.body(number, 1.0, turns, (foot[0], 0.0, foot[2] + 0.05)),
+            text.marker(10 * number + 1, number, foot),
+            f'<Post_Graphic id="{100 * number}" center_marker_id="{10 * number + 1}" {size}/>',
+        ]
+    law = decks.rubbed(0.5)
+    parts += [text.contact(301, graphics, [100], **law)]
+    parts += [text.contact(302, graphics, graphics, **law)]
+    model = decks.model(tmp_path, parts, 3.0, 1e-2)
+    said = mbsim.simulate(model, integrator="MOREAU", tol=1e-2).audit.warnings
+    assert any("choose a shorter one" in line for line in said)
+    assert not any("meshes" in line for line in said)
