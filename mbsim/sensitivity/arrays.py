@@ -25,8 +25,7 @@ ASKED, BENT = 17, 18
 # whether points are on a straight line instead of on the step's polynomial; whether friction asks
 # for another branch beside the run than in it at the end of a step
 STRAIGHT, ODD = 19, 20
-# whether derivatives are integrated along every step of the method, which has no step of its own
-# for them
+# whether the method is GALPHA: its steps are many and short, so order 3 is enough along them too
 ALONG = 21
 # how many times the run's own evaluations derivatives may take each, 0: as many as they do; how
 # many that is by the end of the step that is taken
@@ -99,6 +98,10 @@ class Variations(NamedTuple):
     enough: tags.Constant[F1]  # (2,) how large that may be; LEFT
     rate: F1  # (P,) how much smaller corrections of an implicit method's stages got, one by one
     stale: I1  # (P,) 1 where the run's linearisation was too old for it in the last step
+    # (P, 4, n) a, v', v'' and v''' of a derivative in the last step of GALPHA, see `generalised`;
+    # (P,) in how many steps in a row D' was found, up to what is needed
+    carried: F3
+    ready: I1
     bend: F2  # (P, n) h^4 times the fourth derivative in time of D in the last step
     bend_known: I1  # (P,) 1 where that is known
     bends: I1  # (P,) 1 where the last step was taken along the motion

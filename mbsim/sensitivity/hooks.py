@@ -80,6 +80,7 @@ from mbsim.sensitivity.events import (
     note_shifts,
 )
 from mbsim.sensitivity.explicit import explicit_step, fit_beside, fit_path
+from mbsim.sensitivity.generalised import generalised_step, note_along
 from mbsim.sensitivity.implicit import implicit_step
 from mbsim.sensitivity.later import UNKNOWN, add, add_motion, give_up, go_on, is_steady, pays
 from mbsim.sensitivity.reintegration import hold, make_sure
@@ -143,15 +144,15 @@ def fit_hermite(V: Variations, m: Method, h: float) -> None:
 @jitable
 def own_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
     """Fill derivative k at the end of the step as the run's method has it; return a code."""
-    if V.words[ALONG] == 1:
-        V.error[k] = math.inf
-        return 0
     if V.words[ATTEMPT] != 0:
         if V.words[CHANGES] > 0 or (V.bent[k] >= OFTEN and V.bent[k] % NOW_AND_THEN != 0):
             V.error[k] = math.inf
             return 0
         return explicit_step(V, scene, m, t, h, k)
-    code = implicit_step(V, scene, m, t, h, k)
+    if V.words[ALONG] == 1:
+        code = generalised_step(V, scene, m, t, h, k)
+    else:
+        code = implicit_step(V, scene, m, t, h, k)
     if code == Code.NOT_CONVERGED:
         # with an old linearisation, where forces bend: not so along the motion
         V.error[k], code = math.inf, 0
@@ -165,6 +166,8 @@ def bent_step(
     """Fill derivative k, which is in `own`, at the end of a step in which forces bend."""
     if V.words[ALONG] == 0:
         V.smooth[k] = 0
+    if changes:
+        V.ready[k] = 0
     if V.words[ORDERED] == 0:
         V.words[ORDERED] = 1
         if V.words[CHANGES] > 0:
@@ -178,7 +181,9 @@ def bent_step(
     code, V.later[k, LAST_ON] = step_along(V, scene, t, h, k, (0.0, 1.0), goes_on, later)
     if code == 0 and V.words[JOINTS] == 1:
         code = project_end(V, scene, m, t + h, k, e)
-    unknown = V.words[ALONG] == 0 and (changes or not V.error[k] < math.inf)
+    if V.words[ALONG] == 1 and not changes:
+        note_along(V, h, k)
+    unknown = changes or not V.error[k] < math.inf
     if code == 0 and (V.words[REMEMBERED] > 0 or unknown):
         code = remember_end(V, scene, m, t, h, k, e)
         V.reach[k] = reach_of(V, 2.0 * e, DOWN_SIDE)
@@ -304,7 +309,7 @@ def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int
     anew = word & (Taken.Y_CHANGED + Taken.BEGIN_ANEW) != 0
     for k in range(len(V.size)):
         if switched or anew:
-            V.smooth[k] = 0
+            V.smooth[k] = V.ready[k] = 0
         for s in range(V.memory.shape[1]):
             for j in range(V.memory.shape[2]):
                 V.before[k, s, j], V.memory[k, s, j] = V.memory[k, s, j], V.end[k, s, j]

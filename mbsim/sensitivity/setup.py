@@ -40,12 +40,19 @@ _OWN_STATE = (
 )  # fmt: skip
 #: The error of a step of a derivative may be this part of it, or so many tol.
 ENOUGH, ENOUGH_TOL = 1e-9, 10.0
+#: Those of GALPHA, whose steps are many, over those of others: of a step where bodies collide, and
+#: of what an iteration may leave where friction remembers.
+ENOUGH_OFTEN, LEFT_OFTEN = 0.3, 0.1
 #: What an iteration may leave, over the error of a step; where there are contacts, as when they
 #: touch follows from it; of a derivative, where friction remembers: when that sticks and slips
 #: follows from depths, which are far smaller than the model.
-LEFT, LEFT_OF_CONTACTS, LEFT_OF_MEMORY = 0.3, 0.05, 1e-12
+LEFT, LEFT_OF_CONTACTS, LEFT_OF_MEMORY = 0.3, 0.05, 1e-10
 #: What parts of usual steps of differences, and of the least ones, those to one side take.
+#: GALPHA takes many short steps, and looks at how D' changes from one to the next.
 ONE_SIDED, ONE_SIDED_IN_IMPACTS = (3.0, 1.0, 1.0), (1.0, 0.1, 0.3)
+ONE_SIDED_OFTEN, ONE_SIDED_OFTEN_IN_IMPACTS = (0.1, 0.1, 1.0), (1.0, 0.1, 0.1)
+#: What is one whole number of each parameter.
+_FLAGS = ("stale", "bend_known", "ready", "bends", "bent")
 #: What is no signal of the motion.
 _NO_SIGNALS = ("time", "state/", "contact_points/", "events")
 _WHY = {
@@ -103,7 +110,7 @@ class Sensitivities:
         tol: float,
         worth: int = 0,
     ) -> None:
-        self.system, self.directions = system, list(directions)
+        self.system, self.directions, self._tol = system, list(directions), tol
         self.twin = twin_of(system, directions)
         self._table = pack(self.twin.scene)
         self.gathered = Gathered(self.twin)
@@ -165,10 +172,9 @@ class Sensitivities:
             error=np.zeros(count),
             enough=_enough(self.system, tol),
             rate=np.full(count, 0.99),
+            carried=np.zeros((count, 4, n)),
             bend=np.zeros((count, n)),
-            **{name: np.zeros(count, dtype=np.int64) for name in ("stale", "bend_known")},
-            bends=np.zeros(count, dtype=np.int64),
-            bent=np.zeros(count, dtype=np.int64),
+            **{name: np.zeros(count, dtype=np.int64) for name in _FLAGS},
             jump=np.zeros((5, n)),
             end=np.zeros((count, *shape)),
             middle=np.zeros((count, *shape)),
@@ -265,9 +271,12 @@ class Sensitivities:
         words[at.FITTED] = 0
         joints = words[at.JOINTS] == 1
         self.arrays = self.arrays._replace(
+            enough=_enough(self.system, self._tol, words[at.ALONG] == 1),
+            one_sided=_one_sided(self.system, words[at.ALONG] == 1),
             weights=np.zeros(0) if joints or running.implicit else _weights(running),
             estimates=np.zeros((1, 0)) if running.implicit else _estimates(running),
             smooth=np.zeros(len(self.directions), dtype=np.int64),
+            ready=np.zeros(len(self.directions), dtype=np.int64),
         )
         if self.arrays.dense.shape[1] != running.dense:
             self.arrays = self.arrays._replace(
@@ -353,18 +362,31 @@ class Sensitivities:
         ]
 
 
-def _enough(system: System, tol: float) -> Array:
-    """Return what the error of a step may be, and what an iteration may leave."""
+def _collides(system: System) -> bool:
+    """Return whether there are contacts, and no friction that remembers."""
+    return bool(system.contact_ids) and system.scene.state.memory.shape[1] == 0
+
+
+def _enough(system: System, tol: float, often: bool = False) -> Array:
+    """Return what the error of a step may be, and what an iteration may leave.
+
+    Steps are many and short where they are taken `often`.
+    """
     enough = max(ENOUGH, ENOUGH_TOL * tol)
     if system.scene.state.memory.shape[1]:
-        return np.array((enough, LEFT_OF_MEMORY))
-    return np.array((enough, enough * (LEFT_OF_CONTACTS if system.contact_ids else LEFT)))
+        return np.array((enough, LEFT_OF_MEMORY * (LEFT_OFTEN if often else 1.0)))
+    left = enough * (LEFT_OF_CONTACTS if system.contact_ids else LEFT)
+    return np.array((enough * (ENOUGH_OFTEN if often and _collides(system) else 1.0), left))
 
 
-def _one_sided(system: System) -> Array:
-    """Return what parts of usual steps of differences those to one side take."""
-    collides = system.contact_ids and not system.scene.state.memory.shape[1]
-    return np.array(ONE_SIDED_IN_IMPACTS if collides else ONE_SIDED)
+def _one_sided(system: System, often: bool = False) -> Array:
+    """Return what parts of usual steps of differences those to one side take.
+
+    Steps are many and short where they are taken `often`.
+    """
+    if _collides(system):
+        return np.array(ONE_SIDED_OFTEN_IN_IMPACTS if often else ONE_SIDED_IN_IMPACTS)
+    return np.array(ONE_SIDED_OFTEN if often and not system.contact_ids else ONE_SIDED)
 
 
 def _part(block: Block, rows: slice) -> Block:

@@ -130,15 +130,43 @@ def test_a_spring_is_as_its_closed_form(integrator):
         assert run.parameters[name]["known_until"] == math.inf
 
 
-@pytest.mark.parametrize("integrator", ["DOPRI5", "RADAU5"])
-def test_joints_forces_and_requests_are_as_differences_of_tight_runs(integrator):
+@pytest.mark.parametrize(
+    ("integrator", "most"), [("DOPRI5", 1e-6), ("RADAU5", 1e-6), ("GALPHA", 2e-6)]
+)
+def test_joints_forces_and_requests_are_as_differences_of_tight_runs(integrator, most):
     names = {"Body_Rigid[2].mass": 2.0, "Force_SpringDamper[5].stiffness": 20.0}
     signals = ("bodies/3/position", "bodies/3/angular_velocity", "joints/1/force", "requests/7")
     run = mbsim.simulate(PENDULUM, integrator=integrator, tol=1e-9, sensitivity=list(names))
     for name, value in names.items():
         truth = differences(PENDULUM, name, value, 1e-2 * value, signals, integrator="DOP853")
         for signal in signals:
-            assert off(run.sensitivity(signal, name), truth[signal]) < 1e-6
+            assert off(run.sensitivity(signal, name), truth[signal]) < most
+
+
+# a body that hangs on a stiff spring hardly moves, with vibrations of a radian a step and more
+CHAIN = SPRING.replace(
+    "</Model>",
+    """<Body_Rigid id="3" cg_id="30" mass="2" inertia_xx="1" inertia_yy="1" inertia_zz="1"/>
+<Reference_Marker id="30" body_id="3" pos_x="4"/><Reference_Marker id="12" body_id="1" pos_x="5"/>
+<Force_SpringDamper id="7" type="TRANSLATIONAL" i_marker_id="30" j_marker_id="12" stiffness="1e6"
+ length="1"/>
+<Force_SpringDamper id="8" type="TRANSLATIONAL" i_marker_id="30" j_marker_id="20" stiffness="2"
+ length="2.8"/></Model>""",
+)
+
+
+def test_what_vibrates_faster_than_steps_of_generalised_alpha_does_not_grow():
+    name, signal = "Force_SpringDamper[4].stiffness", "bodies/2/position/x"
+    run = mbsim.simulate(CHAIN, integrator="GALPHA", tol=1e-4, sensitivity=[name])
+    assert run.stats["steps"] < 400
+    truth = differences(
+        CHAIN, name, 8.0, 1e-2, [signal, "bodies/3/position/x"], integrator="DOP853"
+    )
+    assert off(run.sensitivity(signal, name), truth[signal]) < 3e-3
+    # of the hung body: its own vibration at most, as one that is damped leaves of it
+    stiff, sure = run.sensitivity("bodies/3/position/x", name), truth["bodies/3/position/x"]
+    assert np.abs(stiff).max() < 2.0 * np.abs(sure).max()
+    assert run.parameters[name]["evaluations"] < run.stats["rhs_evaluations"]
 
 
 def test_a_marker_of_a_joint_moves_where_the_joint_holds():
@@ -164,14 +192,21 @@ def test_ten_impacts(integrator):
 
 
 @pytest.mark.parametrize(
-    ("integrator", "most"),
-    [("AUTO", 1e-4), ("DOPRI5", 1e-4), ("DOP853", 1e-4), ("RADAU5", 1e-4), ("GALPHA", 5e-4)],
+    ("integrator", "tol", "most"),
+    [
+        ("AUTO", 1e-8, 1e-4),
+        ("DOPRI5", 1e-8, 1e-4),
+        ("DOP853", 1e-8, 1e-4),
+        ("RADAU5", 1e-8, 1e-4),
+        ("GALPHA", 1e-8, 3e-4),
+        ("GALPHA", 1e-9, 1e-4),
+    ],
 )
-def test_thirty_impacts_add_no_error_of_their_own(integrator, most):
+def test_thirty_impacts_add_no_error_of_their_own(integrator, tol, most):
     names = {"Reference_Marker[20].pos_z": (0.6, 3e-7), "Force_Contact[301].damping": (200.0, 5e-5)}
     how, signal = {"end_time": 4.5, "print_interval": 0.01}, "bodies/2/velocity/z"
     deck = MODELS / "bouncing_sphere.xml"
-    run = mbsim.simulate(deck, integrator=integrator, tol=1e-8, sensitivity=list(names), **how)
+    run = mbsim.simulate(deck, integrator=integrator, tol=tol, sensitivity=list(names), **how)
     flies = run["contacts/301/penetration"] == 0.0
     assert np.count_nonzero(run["events"]["kind"] == "touch") >= 31
     for name, (value, step) in names.items():
