@@ -25,6 +25,8 @@ TURN = 2.0 * math.pi
 SMALL = 1e-6
 #: Rows that the arcs of one disc take.
 ARC_ROWS = 6
+#: Difference of depths across a whole rim, over the largest, from which on it is tilted.
+LEVEL = 0.2
 
 
 @jitable
@@ -49,39 +51,51 @@ def fade(x: float) -> float:
 
 
 @jitable
+def next_arc(arcs: F2, count: int, begin: float, sign: float, last: float) -> tuple[float, float]:
+    """Return (first, length) of the arc that begins next after the angle `last` from `begin` on.
+
+    `sign` 1 looks to the left, -1 to the right; first is a whole turn where there is none.
+    """
+    found, long = TURN, 0.0
+    for m in range(count):
+        start, length = arcs[m, 0], arcs[m, 1]
+        if length > 0.0:
+            first = (start - begin) % TURN if sign > 0.0 else (begin - start - length) % TURN
+            if last < first < found:
+                found, long = first, length
+    return found, long
+
+
+@jitable
 def half_sector(arcs: F2, count: int, begin: float, sign: float) -> V3:
     """Return (angle, c, s) of what arcs leave of the 60 degrees from `begin` on.
 
     `sign` 1 looks to the left, -1 to the right; c, s are cosine and sine of the place that stands
-    for it, times the angle: `begin` itself where some tenths of a radian are left there, else
-    the mean of where the arcs come nearest to it.
+    for it, times the angle. An arc is placed where it comes nearest to `begin`. What lies behind
+    a gap is placed where what is before it is, the more the narrower the gap is against that: an
+    edge that only touches the rim parts nothing.
     """
     width = TURN / 6.0
-    near, rest, c, s = 0.0, 0.0, 0.0, 0.0
+    before = 0.0
     for m in range(count):
+        # an arc that `begin` lies on
         start, length = arcs[m, 0], arcs[m, 1]
-        if length <= 0.0:
-            continue
-        # angles from begin, counted towards the half
         first = (start - begin) % TURN if sign > 0.0 else (begin - start - length) % TURN
-        if first + length > TURN:
-            near = max(near, min(first + length - TURN, width))
-        if first == 0.0:
-            near = max(near, min(length, width))
-        elif first < width:
-            angle = min(length, width - first)
-            rest += angle
-            c += angle * math.cos(begin + sign * first)
-            s += angle * math.sin(begin + sign * first)
-    total = near + rest
-    if near > 0.0:
-        # all of it, the more the rim is whole around `begin`
-        part = fade(near / 0.3)
-        c, s = (1.0 - part) * c, (1.0 - part) * s
-        weight = near + part * rest
-        c += weight * math.cos(begin)
-        s += weight * math.sin(begin)
-    return total, c, s
+        before = max(before, min(first + length - TURN, width))
+    x, y = math.cos(begin), math.sin(begin)
+    c, s, end, last = before * x, before * y, before, -1.0
+    for _ in range(count):
+        first, length = next_arc(arcs, count, begin, sign, last)
+        if first >= width:
+            break
+        gap, last = max(0.0, first - end), first
+        own_x, own_y = math.cos(begin + sign * first), math.sin(begin + sign * first)
+        part = (gap / (gap + before)) ** 2 if gap > 0.0 else 0.0
+        x, y = x + part * (own_x - x), y + part * (own_y - y)
+        angle = min(length, width - first)
+        before, end = before + angle, first + angle
+        c, s = c + angle * x, s + angle * y
+    return before, c, s
 
 
 @jitable
@@ -145,16 +159,19 @@ def put_rim(
     """Write up to six points for what is left of a rim, `total` [rad] in all.
 
     Tilted, the sectors are set around the deepest point (u), so that it carries wherever the
-    tilt turns. Flat, the tilt has no direction: a rim that is cut is divided around its own
-    middle `own`, so that the centre of pressure does not turn with a tilt of 1e-9. Many arguments
-    because compiled code is given numbers, not records.
+    tilt turns. Flat, the tilt has no direction: the rim is divided around its own middle `own`,
+    so that the centre of pressure does not turn with a tilt of 1e-9. Three points of a whole rim
+    carry the same around any place while all touch: it goes over to the deepest one long before.
+    Many arguments because compiled code is given numbers, not records.
     """
     _, _, _, r, _, rise = disc
-    tilted = fade(2.0 * r * abs(rise) / max(deepest, 1e-300) - 0.5)
-    whole = fade(1.0 - (TURN - total) / 0.5)
-    around_deepest = tilted + whole - tilted * whole
-    put_arcs(points, first, arcs, count, disc, n, side, 0.0, weight * around_deepest)
-    put_arcs(points, first + 3, arcs, count, disc, n, side, own, weight * (1.0 - around_deepest))
+    tilt = 2.0 * r * abs(rise) / max(deepest, 1e-300)
+    tilted, whole = fade(tilt - 0.5), fade(1.0 - (TURN - total) / 0.5)
+    tilted += whole * (fade(tilt / LEVEL) - tilted)
+    if tilted > 0.0:
+        put_arcs(points, first, arcs, count, disc, n, side, 0.0, weight * tilted)
+    if tilted < 1.0:
+        put_arcs(points, first + 3, arcs, count, disc, n, side, own, weight * (1.0 - tilted))
 
 
 @jitable

@@ -59,6 +59,8 @@ AT_EDGE = ARC_ROWS + 8
 BOX_ROWS = AT_EDGE + 3
 #: Farther from where all of an edge, an end or a side is farthest one point is.
 SINGLE = 1e-8
+#: Chords that sum up to less than this part of the radius do not say where a cut rim's middle is.
+NO_MIDDLE = 1e-3
 
 
 @jitable
@@ -200,11 +202,9 @@ def disc_on_face(i: Shape, j: Shape, end: int, k: int, n: V3, f: float, points: 
     end_at_corners(work, 4)
 
     # arcs from where one edge leaves to where the next enters, into rows 2 e + 1
-    arcs = work[1::2]
-    total = 0.0
+    arcs, total = work[1::2], 0.0
     if cuts == 0:
-        arcs[0, 0], arcs[0, 1] = 0.0, TURN
-        total = TURN
+        arcs[0, 0], arcs[0, 1], total = 0.0, TURN, TURN
         for e in range(1, 4):
             arcs[e, 1] = 0.0
     for e in range(4):
@@ -225,7 +225,9 @@ def disc_on_face(i: Shape, j: Shape, end: int, k: int, n: V3, f: float, points: 
                 total += length
                 break
     weight = 4.0 - total / TURN
-    own = math.atan2(sum_y, sum_x) if cuts > 0 else 0.0
+    # a rim that is whole, or cut alike on both sides, has no middle: then it is the face's axis
+    way = scale(NO_MIDDLE * r, edge_axis(j, (k + 1) % 3))
+    own = math.atan2(sum_y + dot(way, v), sum_x + dot(way, u))
     put_rim(points, 0, arcs, 4, disc, n, 1.0, total, own, weight, f)
     put_corners(work, disc, n, weight)
     reach = 0.0
