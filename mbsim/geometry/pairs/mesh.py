@@ -12,7 +12,16 @@ from mbsim.core.blend import step
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
 from mbsim.core.rotation import add, any_tangent, cross, dot, scale, sub, vector
-from mbsim.geometry.catalog import AT_DEPTH, AT_WEIGHT, axis, pair, put_point, region
+from mbsim.geometry.catalog import (
+    AT_DEPTH,
+    AT_NORMAL,
+    AT_WEIGHT,
+    COUPLE,
+    axis,
+    pair,
+    put_point,
+    region,
+)
 from mbsim.geometry.crossing import LEAST_WEIGHT
 from mbsim.geometry.polyhedron import (
     CUBE,
@@ -42,17 +51,21 @@ LEANS, LIES = 0.9945, 0.9994
 
 
 @jitable
-def _weights_of_patches(hull: F1, local: V3, points: F2) -> None:
+def _weights_of_patches(hull: F1, local: V3, points: F2) -> float:
     """Fill the weights of the patches of a fine mesh over a plane of normal `local`.
 
     The corners of a side that lies share 4 among them, as those of a box do; as far as none
     lies, the deepest corner has a weight of 1. Facets of a round surface are no sides.
+    Returns how far a side lies, 0 to 1. Of rows with corners of such a side the normal is the mean
+    of these, and the first number of the couple 1; of others that is 0.
     """
     rows, deepest, flat, total = int(hull[ROWS]), 0, 0.0, 0.0
     planes, starts = int(hull[AT_PLANES]), int(hull[AT_STARTS])
-    loops, data = int(hull[AT_LOOPS]), int(hull[AT_DATA])
+    loops, data, corners = int(hull[AT_LOOPS]), int(hull[AT_DATA]), int(hull[AT_CORNERS])
     for row in range(rows):
-        points[row, AT_WEIGHT] = 0.0
+        points[row, AT_WEIGHT] = points[row, COUPLE] = 0.0
+        for c in range(3):
+            points[row, AT_NORMAL + c] = 0.0
         if points[row, AT_DEPTH] > points[deepest, AT_DEPTH]:
             deepest = row
     for f in range(int(hull[FACES])):
@@ -62,12 +75,19 @@ def _weights_of_patches(hull: F1, local: V3, points: F2) -> None:
             flat, total = max(flat, lies), total + lies
             first, last = int(hull[starts + f]), int(hull[starts + f + 1])
             for at in range(first, last):
-                corner = int(hull[loops + 2 * at])
-                points[int(hull[data + 3 * corner + 2]), 7] += 4.0 * lies / (last - first)
-    if total > 0.0:
-        for row in range(rows):
+                corner, weight = int(hull[loops + 2 * at]), 4.0 * lies / (last - first)
+                row = int(hull[data + 3 * corner + 2])
+                points[row, AT_WEIGHT] += weight
+                for c in range(3):
+                    points[row, AT_NORMAL + c] += weight * hull[corners + 3 * corner + c]
+    for row in range(rows):
+        if points[row, AT_WEIGHT] > 0.0:
+            points[row, COUPLE] = 1.0
+            for c in range(3):
+                points[row, AT_NORMAL + c] /= points[row, AT_WEIGHT]
             points[row, AT_WEIGHT] *= flat / total
     points[deepest, AT_WEIGHT] += 1.0 - flat
+    return flat
 
 
 @pair("MESH", "PLANE", slots=MOST_ROWS)
@@ -75,7 +95,8 @@ def mesh_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> 
     """Every corner below the plane is a point; of a patch of corners its deepest one.
 
     A mesh with more corners than rows stands for a curved surface: its deepest corner alone has
-    the whole force, unless a face lies flat (see `_weights_of_patches`).
+    the whole force, unless a face lies flat (see `_weights_of_patches`). Of that a patch has the
+    mean of its corners: all are as deep, and which one is the deepest is rounding.
     """
     hull = floats_at(size_i[0], size_i[1])
     n = axis(frame_j, 2)
@@ -92,14 +113,18 @@ def mesh_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> 
         if depth > points[row, AT_DEPTH]:
             # remember which corner; its place follows once
             points[row, AT_DEPTH], points[row, 1] = depth, k
+    flat = 0.0
     if int(hull[CORNERS]) > rows:
-        _weights_of_patches(hull, local, points)
+        flat = _weights_of_patches(hull, local, points)
     else:
         for row in range(rows):
             points[row, AT_WEIGHT] = hull[weights + row]
     for row in range(rows):
-        depth, k = points[row, AT_DEPTH], int(points[row, 1])
-        p = add(vector(frame_i), to_global(frame_i, vector(hull, corners + 3 * k)))
+        depth, p = points[row, AT_DEPTH], vector(hull, corners + 3 * int(points[row, 1]))
+        if flat > 0.0 and points[row, COUPLE] > 0.0:
+            p = add(p, scale(flat, sub(vector(points[row, AT_NORMAL:]), p)))
+            depth = -height - dot(p, local)
+        p = add(vector(frame_i), to_global(frame_i, p))
         put_point(points[row], depth, add(p, scale(0.5 * depth, n)), n, points[row, AT_WEIGHT])
         if points[row, AT_WEIGHT] <= LEAST_WEIGHT:
             # a point without force is none
