@@ -25,6 +25,8 @@ TURN = 2.0 * math.pi
 SMALL = 1e-6
 #: Rows that the arcs of one disc take.
 ARC_ROWS = 6
+#: Chords that sum up to less than this part of the radius do not say where a cut rim's middle is.
+NO_MIDDLE = 1e-3
 #: Difference of depths across a whole rim, over the largest, from which on it is tilted.
 LEVEL = 0.2
 
@@ -48,6 +50,18 @@ def fade(x: float) -> float:
     """Return the smooth step 3 x^2 - 2 x^3 from 0 to 1, constant outside."""
     x = min(1.0, max(0.0, x))
     return x * x * (3.0 - 2.0 * x)
+
+
+@jitable
+def own_middle(sum_x: float, sum_y: float, way_x: float, way_y: float, r: float) -> float:
+    """Return the angle of the middle of what chords leave of a rim of radius r.
+
+    The normals of the chords add up to (sum_x, sum_y). A rim that is whole, or cut alike on both
+    sides, has no middle: then it is the unit vector (way_x, way_y), an edge's direction.
+    """
+    least = NO_MIDDLE * r
+    part = least * (1.0 - fade(math.hypot(sum_x, sum_y) / least))
+    return math.atan2(sum_y + part * way_y, sum_x + part * way_x)
 
 
 @jitable

@@ -172,9 +172,9 @@ def _failure(system: System, found: Balance, t: float) -> str:
         f"no static equilibrium found at time {t:.9g} in {found.iterations} iterations: "
         f"{_share(found)}; {why}"
     )
-    rubs = [id for id, c in system.model.contacts.items() if c.cff_type != "COULOMB_OFF"]
-    if rubs:
-        who = element_name(system.model.file, "Force_Contact", rubs[0])
+    frictional = [id for id, c in system.model.contacts.items() if c.cff_type != "COULOMB_OFF"]
+    if frictional:
+        who = element_name(system.model.file, "Force_Contact", frictional[0])
         said += (
             f"; friction, as {who} has, does nothing in a Static: where friction alone keeps "
             "bodies from sliding off let a Transient bring them to rest"

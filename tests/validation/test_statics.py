@@ -260,9 +260,9 @@ def test_box_on_a_slope_finds_no_rest(tmp_path):
 
 def test_what_only_friction_holds_is_said_to_be_so(tmp_path):
     """A box beside the middle of another one tilts it and slides off; with friction it rests."""
-    rubs = 'cff_type="COULOMB_ON" mu_static="0.3" mu_dynamic="0.3" stiction_trans_vel="0.01"'
+    frictional = 'cff_type="COULOMB_ON" mu_static="0.3" mu_dynamic="0.3" stiction_trans_vel="0.01"'
     deck = GROUND + box(2, 0.1) + box(3, 0.3, x=0.03) + GRAVITY
-    for more, said in ((f'{rubs} friction_trans_vel="0.02"', "Force_Contact[1]"), ("", "")):
+    for more, said in ((f'{frictional} friction_trans_vel="0.02"', "Force_Contact[1]"), ("", "")):
         pairs = contact(1, 200, 100, more=more) + contact(2, 300, 200, more=more)
         with pytest.raises(SolverError) as raised:
             run(tmp_path, deck + pairs)

@@ -30,6 +30,7 @@ from mbsim.geometry.manifold import (
     disc_lies,
     line_lies,
     line_weight,
+    own_middle,
     put_apart,
     put_rim,
     put_weighted,
@@ -59,8 +60,6 @@ AT_EDGE = ARC_ROWS + 8
 BOX_ROWS = AT_EDGE + 3
 #: Farther from where all of an edge, an end or a side is farthest one point is.
 SINGLE = 1e-8
-#: Chords that sum up to less than this part of the radius do not say where a cut rim's middle is.
-NO_MIDDLE = 1e-3
 
 
 @jitable
@@ -225,9 +224,8 @@ def disc_on_face(i: Shape, j: Shape, end: int, k: int, n: V3, f: float, points: 
                 total += length
                 break
     weight = 4.0 - total / TURN
-    # a rim that is whole, or cut alike on both sides, has no middle: then it is the face's axis
-    way = scale(NO_MIDDLE * r, edge_axis(j, (k + 1) % 3))
-    own = math.atan2(sum_y + dot(way, v), sum_x + dot(way, u))
+    way = edge_axis(j, (k + 1) % 3)
+    own = own_middle(sum_x, sum_y, dot(way, u), dot(way, v), r)
     put_rim(points, 0, arcs, 4, disc, n, 1.0, total, own, weight, f)
     put_corners(work, disc, n, weight)
     reach = 0.0

@@ -38,6 +38,7 @@ from mbsim.geometry.manifold import (
     disc_lies,
     line_lies,
     line_weight,
+    own_middle,
     put_apart,
     put_rim,
     put_weighted,
@@ -244,7 +245,8 @@ def end_on_face(hull: F1, face: int, i: Shape, end: int, n: V3, f: float, points
                 total += length
                 break
     weight = 4.0 - total / TURN
-    own = math.atan2(sum_y, sum_x) if cuts > 0 else 0.0
+    way = work[1, TURNS]
+    own = own_middle(sum_x, sum_y, math.cos(way), math.sin(way), r)
     put_rim(points, 0, arcs, count, disc, n, 1.0, total, own, weight, f)
     put_shared(points, work, count, disc, n, weight)
     return disc_lies(min(r, 0.5 * (high - low)), rise, f)
