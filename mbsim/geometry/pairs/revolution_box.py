@@ -20,7 +20,13 @@ from mbsim.geometry.convex import (
     shallow,
     slant,
 )
-from mbsim.geometry.face_edges import clip_edge, corner_turn, end_at_corners
+from mbsim.geometry.face_edges import (
+    chord_normals,
+    corner_turn,
+    cut_edge,
+    end_at_corners,
+    fill_arcs,
+)
 from mbsim.geometry.manifold import (
     ARC_ROWS,
     TURN,
@@ -174,8 +180,7 @@ def disc_on_face(i: Shape, j: Shape, end: int, k: int, n: V3, f: float, points: 
     # the corners go round to the left, seen against o, which is along -n; the face's axes and
     # its normal are right-handed for sk = 1
     work = points[ARC_ROWS:]
-    cuts, beyond, sum_x, sum_y = 0, False, 0.0, 0.0
-    inside = True
+    cuts, beyond, inside = 0, False, True
     for e in range(4):
         first, second = ((4 - e) % 4, (3 - e) % 4) if sk > 0.0 else (e, (e + 1) % 4)
         a, b = face_corner(j, k, sk, first), face_corner(j, k, sk, second)
@@ -185,48 +190,20 @@ def disc_on_face(i: Shape, j: Shape, end: int, k: int, n: V3, f: float, points: 
         ax, ay, bx, by = dot(a, u), dot(a, v), dot(b, u), dot(b, v)
         if ax * by - ay * bx <= 0.0:
             inside = False
-        work[2 * e + 1, 6] = math.atan2(by - ay, bx - ax)
-        work[2 * e, 7] = 0.0
-        code = clip_edge(work[2 * e], ax, ay, bx, by, r)
+        code = cut_edge(work, e, ax, ay, bx, by, r)
         if code == 1:
             cuts += 1
-            work[2 * e, 7] = 1.0
-            # the normal of the border adds up to 0 around it: what the chords lack the arcs have
-            sum_x -= work[2 * e, 3] - work[2 * e, 1]
-            sum_y += work[2 * e, 2] - work[2 * e, 0]
         elif code == -1:
             beyond = True
     if cuts == 0 and (beyond or not inside):
         return -1.0
     end_at_corners(work, 4)
-
-    # arcs from where one edge leaves to where the next enters, into rows 2 e + 1
-    arcs, total = work[1::2], 0.0
-    if cuts == 0:
-        arcs[0, 0], arcs[0, 1], total = 0.0, TURN, TURN
-        for e in range(1, 4):
-            arcs[e, 1] = 0.0
-    for e in range(4):
-        if cuts == 0:
-            break
-        arcs[e, 1] = 0.0
-        if work[2 * e, 7] == 0.0 or work[2 * e, 5] == 0.0:
-            continue
-        for step in range(1, 5):
-            g = (e + step) % 4
-            if work[2 * g, 7] == 1.0:
-                start = math.atan2(work[2 * e, 3], work[2 * e, 2])
-                stop = math.atan2(work[2 * g, 1], work[2 * g, 0])
-                length = (stop - start) % TURN
-                # a corner on the circle: rounding must not make it a whole turn
-                length = 0.0 if cuts > 1 and length > TURN - 1e-9 else length
-                arcs[e, 0], arcs[e, 1] = start, length
-                total += length
-                break
+    total = fill_arcs(work, 4, cuts)
     weight = 4.0 - total / TURN
     way = edge_axis(j, (k + 1) % 3)
-    own = own_middle(sum_x, sum_y, dot(way, u), dot(way, v), r)
-    put_rim(points, 0, arcs, 4, disc, n, 1.0, total, own, weight, f)
+    x, y = chord_normals(work, 4)
+    own = own_middle(x, y, dot(way, u), dot(way, v), r)
+    put_rim(points, 0, work[1::2], 4, disc, n, 1.0, total, own, weight, f)
     put_corners(work, disc, n, weight)
     reach = 0.0
     for m in range(3):

@@ -29,7 +29,15 @@ from mbsim.geometry.catalog import (
     rigid_pair,
 )
 from mbsim.geometry.convex import BOX, ROTOR, Shape, far
-from mbsim.geometry.face_edges import clip_edge, corner_turn, end_at_corners
+from mbsim.geometry.face_edges import (
+    CUT,
+    TURNS,
+    chord_normals,
+    corner_turn,
+    cut_edge,
+    end_at_corners,
+    fill_arcs,
+)
 from mbsim.geometry.manifold import (
     ARC_ROWS,
     TURN,
@@ -49,7 +57,11 @@ from mbsim.geometry.manifold import (
 from mbsim.geometry.mesh.merging import to_local
 from mbsim.geometry.pairs.revolution import cylinder_size
 from mbsim.geometry.pairs.revolution_box import SINGLE, side_on_edge
-from mbsim.geometry.pairs.round_mesh import high_corner, least_overlap
+from mbsim.geometry.pairs.round_mesh import (
+    high_corner,
+    highest_row,
+    least_overlap,
+)
 from mbsim.geometry.polyhedron import corner, plane, to_global
 from mbsim.geometry.rotor import (
     NEARLY,
@@ -81,30 +93,12 @@ AT_ONE = AT_EDGE + 3
 RIGID_ROWS = AT_ONE + 1
 #: A face or an end seen nearer to edge-on than this cosine has nothing in common with another.
 EDGE_ON = 1e-3
-#: Columns of an edge of a face (`geometry.face_edges`).
-ENTERS_X, ENTERS_Y, LEAVES_X, LEAVES_Y, ENTERS, LEAVES, TURNS, CUT = range(8)
-
-
-@jitable
-def corner_number(hull: F1, n: V3) -> int:
-    """Return the number of the corner that is highest along n."""
-    at, best, found = int(hull[AT_CORNERS]), -math.inf, 0
-    for k in range(int(hull[CORNERS])):
-        height = dot(vector(hull, at + 3 * k), n)
-        if height > best:
-            best, found = height, k
-    return found
 
 
 @jitable
 def facing(hull: F1, n: V3) -> int:
     """Return the face whose normal is nearest to n."""
-    at, best, found = int(hull[AT_PLANES]), -math.inf, 0
-    for face in range(int(hull[FACES])):
-        along = dot(vector(hull, at + 4 * face), n)
-        if along > best:
-            best, found = along, face
-    return found
+    return highest_row(hull, int(hull[AT_PLANES]), 4, int(hull[FACES]), n)
 
 
 @jitable
@@ -113,7 +107,8 @@ def edge_facing(hull: F1, n: V3) -> Shape:
 
     The third axis of the box is along the edge.
     """
-    k, at, best = corner_number(hull, n), int(hull[AT_EDGES]), math.inf
+    k = highest_row(hull, int(hull[AT_CORNERS]), 3, int(hull[CORNERS]), n)
+    at, best = int(hull[AT_EDGES]), math.inf
     p, q = corner(hull, hull[at]), corner(hull, hull[at + 1])
     for edge in range(int(hull[EDGES])):
         row = at + 4 * edge
@@ -199,7 +194,7 @@ def end_on_face(hull: F1, face: int, i: Shape, end: int, n: V3, f: float, points
     work = np.zeros((2 * count, 8))
 
     # backwards the corners go round to the left, seen against o
-    cuts, beyond, inside, sum_x, sum_y = 0, False, True, 0.0, 0.0
+    cuts, beyond, inside = 0, False, True
     low, high = math.inf, -math.inf
     for e in range(count):
         a = corner(hull, hull[loops + 2 * (last - 1 - e)])
@@ -211,43 +206,20 @@ def end_on_face(hull: F1, face: int, i: Shape, end: int, n: V3, f: float, points
         low, high = min(low, ax), max(high, ax)
         if ax * by - ay * bx <= 0.0:
             inside = False
-        row = work[2 * e]
-        work[2 * e + 1, TURNS] = math.atan2(by - ay, bx - ax)
-        code = clip_edge(row, ax, ay, bx, by, r)
+        code = cut_edge(work, e, ax, ay, bx, by, r)
         if code == 1:
             cuts += 1
-            row[CUT] = 1.0
-            # the normal of the border adds up to 0 around it: what the chords lack the arcs have
-            sum_x -= row[LEAVES_Y] - row[ENTERS_Y]
-            sum_y += row[LEAVES_X] - row[ENTERS_X]
         elif code == -1:
             beyond = True
     if cuts == 0 and (beyond or not inside):
         return -1.0
     end_at_corners(work, count)
-
-    # arcs from where one edge leaves to where the next enters
-    arcs, total = work[1::2], 0.0
-    if cuts == 0:
-        arcs[0, 1] = total = TURN
-    for e in range(count):
-        if work[2 * e, CUT] == 0.0 or work[2 * e, LEAVES] == 0.0:
-            continue
-        for step in range(1, count + 1):
-            g = (e + step) % count
-            if work[2 * g, CUT] == 1.0:
-                start = math.atan2(work[2 * e, LEAVES_Y], work[2 * e, LEAVES_X])
-                stop = math.atan2(work[2 * g, ENTERS_Y], work[2 * g, ENTERS_X])
-                length = (stop - start) % TURN
-                # a corner on the circle: rounding must not make it a whole turn
-                length = 0.0 if cuts > 1 and length > TURN - 1e-9 else length
-                arcs[e, 0], arcs[e, 1] = start, length
-                total += length
-                break
+    total = fill_arcs(work, count, cuts)
     weight = 4.0 - total / TURN
     way = work[1, TURNS]
-    own = own_middle(sum_x, sum_y, math.cos(way), math.sin(way), r)
-    put_rim(points, 0, arcs, count, disc, n, 1.0, total, own, weight, f)
+    x, y = chord_normals(work, count)
+    own = own_middle(x, y, math.cos(way), math.sin(way), r)
+    put_rim(points, 0, work[1::2], count, disc, n, 1.0, total, own, weight, f)
     put_shared(points, work, count, disc, n, weight)
     return disc_lies(min(r, 0.5 * (high - low)), rise, f)
 

@@ -74,14 +74,24 @@ def beyond(solid: Shape, p: V3) -> float:
 
 
 @jitable
+def highest_row(hull: F1, at: int, width: int, count: int, n: V3) -> int:
+    """Return which row, of `count` that begin with a vector, has the one farthest along n.
+
+    Rows are `width` numbers long, from `at` on: corners, or faces by their normals.
+    """
+    best, found = -math.inf, 0
+    for k in range(count):
+        height = dot(vector(hull, at + width * k), n)
+        if height > best:
+            best, found = height, k
+    return found
+
+
+@jitable
 def high_corner(hull: F1, n: V3) -> V3:
     """Return the corner that is highest along n."""
-    at, best, found = int(hull[AT_CORNERS]), -math.inf, (0.0, 0.0, 0.0)
-    for k in range(int(hull[CORNERS])):
-        p = vector(hull, at + 3 * k)
-        if dot(p, n) > best:
-            best, found = dot(p, n), p
-    return found
+    at = int(hull[AT_CORNERS])
+    return vector(hull, at + 3 * highest_row(hull, at, 3, int(hull[CORNERS]), n))
 
 
 @jitable
