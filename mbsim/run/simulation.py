@@ -66,7 +66,7 @@ def _limited(system: System, timeout: float | None, tell: Notify) -> AbstractCon
 def _listed(name: str, given: Iterable[Any]) -> tuple[Any, ...]:
     """Return what was given as a list; one text is no list of its letters."""
     if isinstance(given, (str, PathLike)):
-        raise ModelError(f"{name}={str(given)!r}: must be a list; [{str(given)!r}] has this one")
+        raise ModelError(f"{name}={str(given)!r}: must be a list, as [{str(given)!r}]")
     return tuple(given)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
 
 import pytest
 
@@ -15,13 +16,15 @@ STIFFNESS = "Force_Contact[301].stiffness"
 
 @pytest.mark.parametrize("name", ["signals", "plugins", "sensitivity"])
 def test_one_text_is_no_list_of_its_letters(name):
-    with pytest.raises(mbsim.errors.ModelError, match=rf"{name}='abc': must be a list; \['abc'\]"):
+    with pytest.raises(
+        mbsim.errors.ModelError, match=rf"{name}='abc': must be a list, as \['abc'\]"
+    ):
         mbsim.simulate(DECK, **{name: "abc"})
 
 
 def test_a_path_is_no_list_of_plugins():
     with pytest.raises(mbsim.errors.ModelError, match="plugins='a\\.py': must be a list"):
-        mbsim.simulate(DECK, plugins=MODELS.__class__("a.py"))
+        mbsim.simulate(DECK, plugins=Path("a.py"))
 
 
 @pytest.mark.parametrize("how", ["r", "rb"])
