@@ -130,6 +130,11 @@ COARSE = 0.02
 #: if that is more than this part of what errors of all steps may make, which is large at rest.
 FEEDS, FEEDS_ERRORS = 0.3, 0.2
 
+#: What is said of contacts of meshes that are not convex, where they feed motion.
+NO_POTENTIAL = (
+    "its meshes are not convex, and the force on their largest depth has no potential; that of "
+    'contact_depth="FIELD" has one'
+)
 #: What is said of overlaps whose force cannot be trusted.
 TOO_DEEP = (
     "{i} and {j} go too deep into each other, first at time {time:.9g} at {who}: deeper than the "
@@ -270,17 +275,22 @@ def _feeding(
     explained = (
         FEEDS_ERRORS * usual * (float(kept.tally[codes.ERRORS_ALL]) + tol * math.sqrt(steps))
     )
+    # a field of depth has a potential
+    patched = {
+        kind.contact
+        for kind in system.plans.kinds
+        if kind.form is not None and kind.form.patches and "FIELD" not in kind.closed_form
+    }
     said = []
     for id, share in shares.items():
         if id is None or not share.change > max(FEEDS * size, explained):
             continue
         who = element_name(system.model.file, "Force_Contact", id)
         part = 100.0 * share.change / size
+        why = NO_POTENTIAL if id in patched else "is its force the slope of an energy?"
         said.append(
             f"{who} gave {share.change:.2g} {unit} more than it took, {part:.2g} % of the largest "
-            f"energy in the run, most of it at time {share.time:.9g}: forces on "
-            'meshes that are not convex have no potential; contact_depth="FIELD" has one, more '
-            "damping hides it"
+            f"energy in the run, most of it at time {share.time:.9g}: {why}"
         )
     return said
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 import trimesh
 
 from helpers import decks
 from helpers.decks import run_deck
+from mbsim.results import audit
 
 GAVE = "Force_Contact[301] gave"
 
@@ -35,16 +38,20 @@ def test_what_rocks_on_a_force_without_a_potential_is_told(method, tol, tmp_path
     run = run_deck(tmp_path, deck, end_time=1.0, integrator=method, tol=tol)
     # nothing drives it, and it does not come to rest
     assert np.ptp(run["contacts/301/force"][-100:, 2]) > 2.0
-    assert any(GAVE in said and "no potential" in said for said in run.audit.warnings)
+    assert any(GAVE in said and "has no potential" in said for said in run.audit.warnings)
 
 
 @pytest.mark.parametrize(
     ("beside", "depth"),
     [(0.0, ""), (0.05, 'contact_depth="FIELD"'), (0.02, 'contact_depth="FIELD"')],
 )
-def test_what_comes_to_rest_is_not(beside, depth, tmp_path):
+def test_what_loses_its_energy_is_not(beside, depth, tmp_path):
     run = run_deck(tmp_path, ring_on_plane(beside, depth) + decks.GRAVITY, end_time=3.0)
     assert run.audit.warnings == ()
+    left = run["energy/kinetic"] + run["energy/potential"]
+    # it never rises, but by what the balance is off
+    assert np.diff(left[::20]).max() <= run.audit.balance
+    assert left[0] - left[-1] > 10.0 * run.audit.balance
 
 
 @pytest.mark.parametrize("tol", [1e-3, 1e-5, 1e-7])
@@ -53,3 +60,14 @@ def test_a_force_with_a_potential_is_not_however_it_bounces(tol, tmp_path):
     deck += decks.contact(cnf_type="IMPACT", stiffness=1e5, exponent=1.5, damping=1.0, dmax=1e-4)
     run = run_deck(tmp_path, deck, end_time=2.0, tol=tol)
     assert not any(GAVE in said for said in run.audit.warnings)
+
+
+def test_what_is_no_mesh_is_not_called_one(tmp_path, monkeypatch):
+    """A bound that all contacts are beyond: the ring is told to be a mesh, the ball is not."""
+    monkeypatch.setattr(audit, "FEEDS", -math.inf)
+    monkeypatch.setattr(audit, "FEEDS_ERRORS", -math.inf)
+    deck = decks.GROUND + decks.sphere(0.0999) + decks.GRAVITY + decks.contact()
+    for model, meshes in ((deck, False), (ring_on_plane(0.02, "") + decks.GRAVITY, True)):
+        run = run_deck(tmp_path, model, end_time=0.1)
+        (said,) = [line for line in run.audit.warnings if GAVE in line]
+        assert ("not convex" in said) == meshes
