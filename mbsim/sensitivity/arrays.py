@@ -128,6 +128,7 @@ class Variations(NamedTuple):
     part: tags.Scratch[F3]
     about: tags.Scratch[F2]
     parts: tags.Scratch[I1]
+    wide: tags.Scratch[F1]  # (P,) by how much it is changed where a stick is gone over again
     lasted: F1  # (P,) how long such a part may be that is tried first [T]
     shown: tags.Scratch[F2]  # (P, 2) where that is: SHOWN_AT, SHOWN_LATER
     change: tags.Scratch[F2]  # (MOST_CHANGES, 2) slots that begin or end to touch, at which part

@@ -98,6 +98,7 @@ def find_times(V: Variations, scene: Scene, t: float, H: float, k: int, what: in
     """
     e, best, found, own = half_step(V, k), math.inf, V.times[k, at], 1.0
     if V.words[GONE_OVER] == 1:
+        e = V.wide[k]
         own = crossing(V, scene, t - H, H, k, 0.0, what, 1.0)
     found[:] = math.nan
     for _ in range(TRIES):

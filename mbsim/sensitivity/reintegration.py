@@ -47,11 +47,15 @@ from mbsim.sensitivity.twin import half_step, set_parameter
 SLOW = 1e-4
 #: What the error of one step may be, over that speed: of the run, beside derivatives and alone, of
 #: a derivative, over it; no less than these, which are rounding.
-OF_RUN, ALONE, OF_DERIVATIVE = 5e-7, 5e-9, 5e-4
-ROUNDING, ROUNDING_OF_DERIVATIVE = 4e-15, 1e-10
+OF_RUN, ALONE, OF_DERIVATIVE = 5e-7, 5e-9, 5e-5
+ROUNDING, ROUNDING_OF_DERIVATIVE = 4e-15, 1e-11
 #: It begins so many radians of what swings on the spring back: with a fifth of the critical damping
 #: e^-10 is left of that. No more than so many steps are tried, none shorter than this part.
 RADIANS, MOST_TRIES, SHORTEST = 50.0, 2000, 1e-9
+#: Parameters are changed until the slip is earlier and later by this part of a radian, or by so
+#: many times as much as elsewhere: depths are rounded to 1e-12 of themselves, which moves slips by
+#: 1e-4 of what the least changes do, and far off motions are no straight lines over a parameter.
+SHIFTED, WIDEST = 3e-3, 30.0
 #: In so few since it has stuck nothing has died away.
 FEW = 10.0
 #: What is shaken long before the end has died away there: an error may be e times as large so many
@@ -140,7 +144,7 @@ def slowest(V: Variations, scene: Scene) -> float:
 @jitable
 def side_of(V: Variations, k: int, j: int) -> float:
     """Return by how much parameter k is changed in motion j: the run, and one to either side."""
-    return 0.0 if j == RUN else half_step(V, k) if j == MORE else -half_step(V, k)
+    return 0.0 if j == RUN else V.wide[k] if j == MORE else -V.wide[k]
 
 
 @jitable
@@ -195,7 +199,7 @@ def try_step(V: Variations, scene: Scene, t: float, h: float, k: int, j: int) ->
 def error_of(V: Variations, k: int) -> float:
     """Return the error of the step of derivative k that was tried, over it."""
     up, down, error, whole = V.again[MORE], V.again[LESS], 0.0, 1.0 / V.size[k]
-    part = 0.5 / half_step(V, k)
+    part = 0.5 / V.wide[k]
     for i in range(up.shape[1]):
         off = max(abs(up[OFF, i] - down[OFF, i]), abs(up[OFF_BENT, i] - down[OFF_BENT, i]))
         error = max(error, part * off / V.scale[i])
@@ -295,13 +299,26 @@ def go_on(V: Variations, scene: Scene, t: float, late: float, k: int) -> None:
 
 
 @jitable
-def slips_later(V: Variations, scene: Scene, t: float) -> float:
-    """Return how much later than the run what was gone over slips; 0 where that is not known."""
+def slips_later(V: Variations, scene: Scene, t: float, k: int, e: float) -> float:
+    """Return how much later than at t it slips with parameter k changed by e, NaN if unknown.
+
+    Along the straight line through what was gone over.
+    """
     H, again = V.line[0], V.words[AGAIN]
     V.words[AGAIN], V.words[STRAIGHT] = 0, 1
-    late = H * (crossing(V, scene, t - H, H, 0, 0.0, branch_of(V.asks[0]), 1.0) - 1.0)
+    late = H * (crossing(V, scene, t - H, H, k, e, branch_of(V.asks[0]), 1.0) - 1.0)
     V.words[AGAIN], V.words[STRAIGHT] = again, 0
-    return late if abs(late) < math.inf else 0.0
+    return late
+
+
+@jitable
+def wide_step(V: Variations, scene: Scene, t: float, radian: float, k: int) -> float:
+    """Return by how much parameter k is changed in motions that are gone over."""
+    e = half_step(V, k)
+    apart = abs(slips_later(V, scene, t, k, e) - slips_later(V, scene, t, k, -e))
+    if not apart < math.inf:
+        return e
+    return e * min(max(1.0, 2.0 * SHIFTED * radian / max(apart, 1e-300)), WIDEST)
 
 
 @jitable
@@ -332,15 +349,17 @@ def go_over(V: Variations, scene: Scene, m: Method, t: float, rate: float) -> No
     row, h = begin_at(V, scene, t)
     if row >= 0 and reintegrate(V, scene, t, alone, 1.0, row, h, -1) and is_alike(V, m):
         keep_run(V)
-        V.words[GONE_OVER], late = 1, slips_later(V, scene, t)
+        V.words[GONE_OVER], late = 1, slips_later(V, scene, t, 0, 0.0)
+        late = late if abs(late) < math.inf else 0.0
         go_on(V, scene, t, late, -1)
         keep_run(V)
         for k in range(len(V.size)):
+            V.wide[k] = wide_step(V, scene, t + late, h, k)
             if V.lost[k] == math.inf and reintegrate(V, scene, t, most, exact, row, h, k):
                 go_on(V, scene, t, late, k)
                 for i in range(len(m.y)):
                     change = V.again[MORE, Y, i] - V.again[LESS, Y, i]
-                    V.next[k, i] = 0.5 / half_step(V, k) * change
+                    V.next[k, i] = 0.5 / V.wide[k] * change
     V.words[AGAIN] = 0
 
 

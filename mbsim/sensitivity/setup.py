@@ -193,6 +193,7 @@ class Sensitivities:
             part=np.zeros((count * at.MOST_PARTS, 5, n)),
             about=np.zeros((count * at.MOST_PARTS, 6)),
             parts=np.zeros(count, dtype=np.int64),
+            wide=np.zeros(count),
             lasted=np.zeros(count),
             shown=np.zeros((count, 2)),
             change=np.zeros((at.MOST_CHANGES, 2)),

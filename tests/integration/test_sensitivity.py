@@ -358,13 +358,24 @@ def test_a_belt_through_six_sticks_and_six_slips(name, value):
     truth = differences(BELT, name, value, 3e-4, [signal], integrator="DOP853", **how)[signal]
     for integrator, tol, most in (
         ("DOPRI5", 1e-8, 2e-4),
-        ("DOPRI5", 1e-9, 5e-5),
-        ("DOP853", 1e-8, 5e-5),
-        ("RADAU5", 1e-8, 5e-5),
-        ("GALPHA", 1e-8, 5e-5),
+        ("DOPRI5", 1e-9, 2e-5),
+        ("DOP853", 1e-8, 2e-5),
+        ("RADAU5", 1e-8, 2e-5),
+        ("GALPHA", 1e-8, 2e-5),
     ):
         run = mbsim.simulate(BELT, integrator=integrator, tol=tol, sensitivity=[name], **how)
         assert off(run.sensitivity(signal, name), truth) < most
+
+
+@pytest.mark.parametrize("integrator", ["DOP853", "RADAU5", "GALPHA"])
+def test_slips_are_not_rounded_with_the_depths_of_their_contacts(integrator):
+    # corners slip as springs that stretch by 2e-6 a second reach mu N, and N is rounded to 1e-12
+    name, signal = "Force_Contact[301].mu_dynamic", "bodies/2/position/x"
+    how = {"end_time": 6.0, "print_interval": 0.1}
+    truth = differences(BELT, name, 0.5, 3e-4, [signal], integrator="DOP853", **how)[signal]
+    for tol in (1e-8, 3e-9, 1e-9, 1e-10):
+        run = mbsim.simulate(BELT, integrator=integrator, tol=tol, sensitivity=[name], **how)
+        assert off(run.sensitivity(signal, name), truth) < 2e-5
 
 
 SPRING_OF_FRICTION, NORMAL_SPRING = 'tangential_stiffness="2.5e4"', 'stiffness="1e5" exponent="1"'
