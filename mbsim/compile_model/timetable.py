@@ -158,14 +158,21 @@ class Timetable:
     """
 
     def __init__(
-        self, system: System, tol: float, span: float, estimates: bool, samples: int
+        self,
+        system: System,
+        tol: float,
+        span: float,
+        estimates: bool,
+        samples: int,
+        shortest: float = 0.0,
     ) -> None:
         """Look at what acts in a system, for a Simulate over a time `span`.
 
         `estimates` says whether the method estimates its error, `samples` into how many parts of a
-        step it must divide what others see in one.
+        step it must divide what others see in one, and `shortest` what no step is below [T].
         """
         scene, self.run = system.scene, (span, estimates)
+        self.shortest = shortest
         found, blind = functions(scene, tol if estimates else 0.1 * tol)
         self.looks = blind or _asks_time(system)
         self.tol, self.samples = tol, samples
@@ -224,6 +231,8 @@ class Timetable:
             good, broken = group.judge(member, lo, np.full(len(lo), w), usual, self.run)
             # a jump that counts in a long step is found to rounding
             good &= ~(broken & known)
+            # two cells are no longer than any step, so that smaller ones would bound none
+            good |= ~broken & (2.0 * w <= self.shortest)
             done = good | (w <= _least(lo + w, end))
             kept.append((member[done], lo[done], np.full(done.sum(), w), (broken & ~good)[done]))
             w *= 0.5

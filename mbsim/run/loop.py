@@ -323,7 +323,7 @@ class Runner:
         samples = max(each.samples for each in schemes)
         estimates = methods.explicit.order > 0.0
         span = stage.simulation.end_time - stage.simulation.start_time
-        self.timetable = Timetable(self.system, stage.tol, span, estimates, samples)
+        self.timetable = Timetable(self.system, stage.tol, span, estimates, samples, stage.h_min)
         if fresh:
             memory = method.memory
             memory[scheme.ROW_ENDS] = -np.inf if self.timetable.timed else np.inf

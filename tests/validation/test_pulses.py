@@ -9,6 +9,7 @@ import pytest
 
 import mbsim
 from helpers.decks import GRAVITY, GROUND, contact, run_deck, run_in_pieces, sphere, write_deck
+from mbsim.compile_model.timetable import Timetable, _Group
 from mbsim.errors import SolverError
 
 METHODS = ["DOPRI5", "DOP853", "RADAU5", "GALPHA", "AUTO"]
@@ -151,8 +152,6 @@ def test_a_sensor_of_time_sees_what_is_shorter_than_a_step(tmp_path, located):
     ],
 )
 def test_slow_functions_cost_nothing(tmp_path, monkeypatch, expression, end):
-    from mbsim.compile_model.timetable import Timetable
-
     model = mbsim.read_model(write_deck(tmp_path, force(expression), end, end / 10.0))
     for tol in (1e-3, 1e-5):
         bounded = mbsim.simulate(model, tol=tol).stats["rhs_evaluations"]
@@ -166,6 +165,30 @@ def test_slow_functions_cost_nothing(tmp_path, monkeypatch, expression, end):
             patch.setattr(Timetable, "__init__", unbounded)
             free = mbsim.simulate(model, tol=tol).stats["rhs_evaluations"]
         assert bounded <= 1.03 * free + 12
+
+
+def test_steps_of_given_length_are_not_looked_into(tmp_path, monkeypatch):
+    # cells shorter than h_min bound no step: a driven ram took seconds for what changed nothing
+    ram = (
+        '<Constraint_Joint id="1" type="TRANSLATIONAL" i_marker_id="20" j_marker_id="10"/>'
+        '<Motion_Joint id="1" joint_id="1" motion_type="T" val_type="D" '
+        'expr="0.1*STEP(TIME,0.1,0,0.4,1)"/>'
+        '<Param_Transient integrator_type="MOREAU" h_max="1e-3" h_min="1e-3"/>'
+    )
+    looked, judge = [0], _Group.judge
+
+    def counted(self, member, *others):
+        looked[0] += len(member)
+        return judge(self, member, *others)
+
+    monkeypatch.setattr(_Group, "judge", counted)
+    run = run_deck(tmp_path, BODY + ram, 0.5, 0.01, tol=1e-8)
+    assert run.stats["steps"] == 500
+    assert looked[0] < 20 * 500
+    t = np.clip((run["time"] - 0.1) / 0.3, 0.0, 1.0)
+    np.testing.assert_allclose(
+        run["bodies/2/position/z"], 0.1 * t * t * (3.0 - 2.0 * t), atol=1e-12
+    )
 
 
 def test_a_run_in_pieces_is_the_same(tmp_path, monkeypatch):
