@@ -57,10 +57,12 @@ TALLY_NUMBERS = 7
 # entries of `Points.given`: axes n, x, z; a x axis for I's arm a, then J's; I^-1 of these, as each
 # body's inertia is; inverse masses of I and J; u by r, a symmetric matrix; its inverse, row by row
 # from the diagonal on, 0 where it has none; 1/W_nn, and W_nx, W_nz over W_nn; of x, z what of W is
-# left where n is held
+# left where n is held; how many directions of the plane of contact joints hold then; such a one; by
+# how much u along these is off at the step's end, see `one_point.fill_drift`
 AXES, TURN, SPIN, LIGHT = 0, 9, 27, 45
 W_NN, W_NX, W_NZ, W_XX, W_XZ, W_ZZ, STOPS, ALONG, SCHUR = 47, 48, 49, 50, 51, 52, 53, 59, 62
-GIVEN = 65
+HELD, HELD_ALONG, DRIFT = 65, 66, 68
+GIVEN = 70
 # entries of `Rest.body`: 1 where a body sleeps; its island then; steps for which it was still; 1
 # where nothing of the island of which it is the first moves; of `Rest.count`: how many sleep, 1
 # where some were woken in the step at hand, see below; of `Kept.count`, behind how many there are:

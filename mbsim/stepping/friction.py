@@ -27,7 +27,7 @@ from mbsim.stepping.arrays import (
     Stepping,
 )
 from mbsim.stepping.displacements import NO_IMPACT
-from mbsim.stepping.one_point import apply, solve_point, velocity_of
+from mbsim.stepping.one_point import apply, slip_at, solve_point, velocity_of
 
 #: Closing and slipping are none up to so many times what the solver may leave of a velocity at
 #: most, however short a step.
@@ -107,7 +107,7 @@ def let_yield(S: Stepping, count: int, noise: float) -> bool:
         for k in range(begin, end):
             if P.r[k, 0] == 0.0 or P.holds[k] < S.rules.number[P.contact[k], STICKING]:
                 continue
-            x, z = velocity_of(P, k, 1, M.v), velocity_of(P, k, 2, M.v)
+            x, z = slip_at(P, k, M.v)
             slip = math.sqrt(x * x + z * z)
             if load < 0.0:
                 load = load_of(S, begin, end)

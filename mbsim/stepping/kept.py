@@ -32,7 +32,7 @@ from mbsim.stepping.arrays import (
     STEP_LENGTH,
     Stepping,
 )
-from mbsim.stepping.one_point import velocity_of
+from mbsim.stepping.one_point import slip_at
 
 #: A multiplier that spreads keys over a table: 2^64 over the golden ratio, odd, made positive.
 SPREAD = 0x1E3779B97F4A7C15
@@ -184,7 +184,7 @@ def keep_points(scene: Scene, S: Stepping) -> None:
         gi, gj = sides(scene, s)
         values[KEPT_BODY_I], values[KEPT_BODY_J] = scene.graphics.body[gi], scene.graphics.body[gj]
         values[KEPT_GAP], values[KEPT_CLOSING] = P.gap[k], -P.closing[k]
-        x, z = velocity_of(P, k, 1, M.v), velocity_of(P, k, 2, M.v)
+        x, z = slip_at(P, k, M.v)
         values[KEPT_SLIP] = (x * x + z * z) ** 0.5
         # see `share_sticking`
         values[KEPT_STICKS] = P.mu[k]

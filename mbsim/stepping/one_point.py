@@ -20,6 +20,9 @@ from mbsim.core.rotation import cross, dot
 from mbsim.stepping.arrays import (
     ALONG,
     AXES,
+    DRIFT,
+    HELD,
+    HELD_ALONG,
     LIGHT,
     SCHUR,
     SPIN,
@@ -46,6 +49,12 @@ MOST_SLIPS, ON_CONE = 60, 1e-12
 #: What of W couples n with the plane of contact, or tells its directions apart, is none below this
 #: part: of round bodies that is what rounding leaves.
 ROUND = 1e-14
+#: Joints hold what an impulse moves by less than this part of what it would move free bodies by:
+#: what rounding leaves. A link of a mechanism that is so many times as heavy moves by as little.
+HELD_PART = 1e-12
+#: Slip along what joints hold below so many times half of what it changes by in a step is of the
+#: step: arms of points are those of its begin.
+OF_STEP = 2.0
 
 
 @jitable
@@ -162,17 +171,20 @@ def directions(p: Points, count: int, ground: int) -> F4:
 
 
 @jitable
-def fill_inverse(row: F1) -> None:
-    """Fill the inverse of W, 0 where it has none to speak of, and W_TT - W_TN W_NT / W_NN."""
+def fill_inverse(row: F1, free: tuple[float, float]) -> None:
+    """Fill the inverse of W, 0 where it has none to speak of, and W_TT - W_TN W_NT / W_NN.
+
+    `free` is W of the bodies without joints, along n and across: what is nothing beside that joints
+    hold, see `let_hold`.
+    """
+    if row[W_NN] <= HELD_PART * free[0]:
+        # nothing moves along n
+        row[W_NN] = row[W_NX] = row[W_NZ] = 0.0
     a = (row[W_NN], row[W_NX], row[W_NZ])
     b = (row[W_NX], row[W_XX], row[W_XZ])
     c = (row[W_NZ], row[W_XZ], row[W_ZZ])
     x, y, z = cross(b, c), cross(c, a), cross(a, b)
     determinant = dot(a, x)
-    some = determinant > SINGULAR * a[0] * b[1] * c[2]
-    part = 1.0 / determinant if some else 0.0
-    row[STOPS], row[STOPS + 1], row[STOPS + 2] = part * x[0], part * x[1], part * x[2]
-    row[STOPS + 3], row[STOPS + 4], row[STOPS + 5] = part * y[1], part * y[2], part * z[2]
     some = a[0] > 0.0
     part = 1.0 / a[0] if some else 0.0
     row[ALONG] = part
@@ -183,6 +195,71 @@ def fill_inverse(row: F1) -> None:
         row[ALONG + 1] = row[ALONG + 2] = s12 = 0.0
         s22 = s11
     row[SCHUR], row[SCHUR + 1], row[SCHUR + 2] = s11, s12, s22
+    let_hold(row, HELD_PART * free[1])
+    some = some and row[HELD] == 0.0 and determinant > SINGULAR * a[0] * b[1] * c[2]
+    part = 1.0 / determinant if some else 0.0
+    row[STOPS], row[STOPS + 1], row[STOPS + 2] = part * x[0], part * x[1], part * x[2]
+    row[STOPS + 3], row[STOPS + 4], row[STOPS + 5] = part * y[1], part * y[2], part * z[2]
+
+
+@jitable
+def let_hold(row: F1, least: float) -> None:
+    """Take directions of the plane of contact out of SCHUR that joints hold while n is held.
+
+    Along these S has eigenvalues below `least`, of rounding: friction there moves nothing. Of free
+    bodies that is 0.
+    """
+    row[HELD] = row[HELD_ALONG] = row[HELD_ALONG + 1] = row[DRIFT] = row[DRIFT + 1] = 0.0
+    if least == 0.0:
+        return
+    s11, s12, s22 = row[SCHUR], row[SCHUR + 1], row[SCHUR + 2]
+    half = 0.5 * (s11 - s22)
+    root = math.sqrt(half * half + s12 * s12)
+    large, small = 0.5 * (s11 + s22) + root, 0.5 * (s11 + s22) - root
+    if large <= least:
+        row[HELD] = 2.0
+        row[SCHUR] = row[SCHUR + 1] = row[SCHUR + 2] = 0.0
+    elif small <= least:
+        # of both columns of S - small the longer one is along what moves
+        x, z = (half + root, s12) if half >= 0.0 else (s12, root - half)
+        size = math.sqrt(x * x + z * z)
+        x, z = x / size, z / size
+        row[HELD], row[HELD_ALONG], row[HELD_ALONG + 1] = 1.0, -z, x
+        row[SCHUR], row[SCHUR + 1], row[SCHUR + 2] = large * x * x, large * x * z, large * z * z
+
+
+@jitable
+def held_part(row: F1, x: float, z: float) -> tuple[float, float]:
+    """Return the part of (x, z) along what joints hold."""
+    if row[HELD] == 2.0:
+        return x, z
+    along = x * row[HELD_ALONG] + z * row[HELD_ALONG + 1]
+    return along * row[HELD_ALONG], along * row[HELD_ALONG + 1]
+
+
+@jitable
+def fill_drift(p: Points, k: int, before: F2, free: F2) -> None:
+    """Fill by how much u along what joints hold is off at the step's end.
+
+    What no impulse changes is what joints leave: that is so in the midst of the step, where they
+    hold (`forces.hold_by_joints`). Velocities at its end are those of where bodies are then, so
+    that a wheel on an arm that turns would slip along the arm by the way it turns in half a step.
+    """
+    row = p.given[k]
+    if row[HELD] == 0.0:
+        return
+    n = velocity_of(p, k, 0, free) - velocity_of(p, k, 0, before)
+    x = velocity_of(p, k, 1, free) - velocity_of(p, k, 1, before) - row[ALONG + 1] * n
+    z = velocity_of(p, k, 2, free) - velocity_of(p, k, 2, before) - row[ALONG + 2] * n
+    x, z = held_part(row, x, z)
+    row[DRIFT], row[DRIFT + 1] = 0.5 * x, 0.5 * z
+
+
+@jitable
+def slip_at(p: Points, k: int, v: F2) -> tuple[float, float]:
+    """Return the slip velocity of point k along x and z, without `fill_drift`'s."""
+    row = p.given[k]
+    return velocity_of(p, k, 1, v) - row[DRIFT], velocity_of(p, k, 2, v) - row[DRIFT + 1]
 
 
 @jitable
@@ -200,6 +277,33 @@ def sticks_beside(
     x = (s12 * c[1] - s22 * c[0]) / determinant
     z = (s12 * c[0] - s11 * c[1]) / determinant
     return True, x, z, height - row[ALONG + 1] * x - row[ALONG + 2] * z
+
+
+@jitable
+def sticks_by_joints(
+    row: F1, height: float, c: tuple[float, float], mu: float, least: float
+) -> tuple[bool, float, float]:
+    """Return whether friction (x, z) is this, where joints hold directions of the plane of contact.
+
+    It is along what moves alone, unless something else moves the bodies by more than `least` along
+    what is held: then it slips (`slip_of`).
+    """
+    x, z = held_part(row, c[0], c[1])
+    of_step = OF_STEP * OF_STEP * (row[DRIFT] * row[DRIFT] + row[DRIFT + 1] * row[DRIFT + 1])
+    if x * x + z * z > max(least * least, of_step):
+        return False, 0.0, 0.0
+    if row[HELD] == 2.0:
+        return True, 0.0, 0.0
+    q1, q2 = row[HELD_ALONG + 1], -row[HELD_ALONG]
+    along = q1 * c[0] + q2 * c[1]
+    r = -along / (row[SCHUR] + row[SCHUR + 2])
+    w = row[ALONG + 1] * q1 + row[ALONG + 2] * q2
+    if abs(r) > mu * (height - w * r):
+        sign = -1.0 if along > 0.0 else 1.0
+        slope = 1.0 + mu * w * sign
+        # see `solve_point`
+        r = sign * mu * height / slope if slope > 1e-9 else 0.0
+    return True, r * q1, r * q2
 
 
 @jitable
@@ -268,10 +372,8 @@ def solve_point(p: Points, v: F2, k: int) -> float:
     # its velocity without its impulse
     bn = un - (wnn * rn + wnx * rx + wnz * rz)
     sn, sx, sz = 0.0, 0.0, 0.0
-    if bn < 0.0 and row[ALONG] == 0.0:
-        # nothing moves along n
-        return 0.0
-    if bn < 0.0:
+    # where nothing moves along n nothing presses
+    if bn < 0.0 and row[ALONG] > 0.0:
         # what brings it to rest: r - W^-1 u
         i = STOPS
         sn = rn - (row[i] * un + row[i + 1] * ux + row[i + 2] * uz)
@@ -282,10 +384,16 @@ def solve_point(p: Points, v: F2, k: int) -> float:
             height = -row[ALONG] * bn
             bx = ux - (wnx * rn + wxx * rx + wxz * rz)
             bz = uz - (wnz * rn + wxz * rx + wzz * rz)
-            c = (bx + wnx * height, bz + wnz * height)
+            c = (bx + wnx * height - row[DRIFT], bz + wnz * height - row[DRIFT + 1])
             sn, sx, sz = height, 0.0, 0.0
             some, x, z, n = sticks_beside(row, height, c)
-            if some and n >= 0.0 and x * x + z * z <= mu * mu * n * n:
+            held = False
+            if row[HELD] > 0.0:
+                held, x, z = sticks_by_joints(row, height, c, mu, 1.0 / p.counts[k])
+                n = height - row[ALONG + 1] * x - row[ALONG + 2] * z
+            if held:
+                sn, sx, sz = n, x, z
+            elif some and n >= 0.0 and x * x + z * z <= mu * mu * n * n:
                 sn, sx, sz = n, x, z
             elif mu > 0.0 and (c[0] != 0.0 or c[1] != 0.0):
                 x, z, p.slides[k] = slip_of(row, height, c, mu, p.slides[k])

@@ -215,10 +215,11 @@ def fill_answers(scene: Scene, S: Stepping) -> None:
     P = S.points
     answer_listed(scene, S)
     for k in range(S.tally.count[POINTS]):
-        row = P.given[k]
+        row, free = P.given[k], (0.0, 0.0)
         if P.wide[k] >= 0:
+            free = row[W_NN], max(row[W_XX], row[W_ZZ])
             rows = row_of(P, k, 0), row_of(P, k, 1)
             row[W_NN], row[W_NX] = answer_of(P, k, 0, 0, rows), answer_of(P, k, 0, 1, rows)
             row[W_NZ], row[W_XX] = answer_of(P, k, 0, 2, rows), answer_of(P, k, 1, 1, rows)
             row[W_XZ], row[W_ZZ] = answer_of(P, k, 1, 2, rows), answer_of(P, k, 2, 2, rows)
-        fill_inverse(row)
+        fill_inverse(row, free)

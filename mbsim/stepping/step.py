@@ -78,7 +78,7 @@ from mbsim.stepping.held import begin_answers
 from mbsim.stepping.implicit import is_implicit, take_into_step
 from mbsim.stepping.kept import index_kept, recall
 from mbsim.stepping.near_pairs import FARTHER, list_anew
-from mbsim.stepping.one_point import apply, velocity_of
+from mbsim.stepping.one_point import apply, fill_drift, velocity_of
 from mbsim.stepping.pairs import find_missed, find_points
 from mbsim.stepping.points import fill_answers, fill_point, fill_reach, way_at
 from mbsim.stepping.rebound import limit_rebound
@@ -278,6 +278,7 @@ def start_impulses(scene: Scene, S: Stepping, h: float) -> None:
     M.changed[ground] = 0
     for k in range(S.tally.count[POINTS]):
         look_ahead(S, k, h)
+        fill_drift(P, k, M.before, M.free)
         P.held[k] = 1 if P.part[k] != NO_IMPACT and is_held(S, k, h) else 0
         if P.held[k] == 1:
             P.ahead[k], P.part[k] = max(P.gap[k], 0.0) / h, NO_IMPACT
