@@ -25,7 +25,7 @@ from mbsim.core.address import call_int
 from mbsim.core.arrays import F1, V2
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import cross, dot, vector
-from mbsim.dynamics.constraints.in_use import active_count
+from mbsim.dynamics.constraints.in_use import active_count, is_active
 from mbsim.dynamics.constraints.selection import LEVER, fill_size
 from mbsim.dynamics.contact.forces import FORCE, contact_of
 from mbsim.dynamics.contact.memory import least_limit
@@ -60,6 +60,9 @@ BACK = 0.7
 #: What is let go while it moves goes back only where it is so many times faster, and keeps to the
 #: way in which it is accelerated until it is that many times faster again.
 BEYOND = 3.0
+#: What sticks but is held by joints and motions alone slips with them above so many times the speed
+#: that is settled.
+DRAGS = 10.0
 #: Slots that slip are sought with limits that are lower by this part: where they are just reached
 #: accelerations are 0, and do not tell the way.
 OVER = 1e-5
@@ -86,6 +89,19 @@ def rest(scene: Scene) -> float:
 
 
 @jitable
+def is_dragged(scene: Scene, y: F1, e: int) -> bool:
+    """Return whether the slot of equations e and e + 1 slips though it sticks.
+
+    Its equation follows from those of joints and motions then, and these say something else: a
+    body that may not move along a belt sticks to it while the belt stands, and no longer.
+    """
+    if is_active(scene, e) and is_active(scene, e + 1):
+        return False
+    v = slip_of(scene, y, scene.equations.slot[e])
+    return math.hypot(v[0], v[1]) > max(DRAGS * settled(scene), AT_REST * rest(scene))
+
+
+@jitable
 def ask_sticking(scene: Scene, t: float, y: F1) -> int:
     """Return 1 if a slot asks for another mode than it has, at the point evaluated last, else 0."""
     if part_at_most_of(scene, t, y) > 1.0:
@@ -100,6 +116,8 @@ def ask_sticking(scene: Scene, t: float, y: F1) -> int:
         if scene.state.memory[s, KEPT_MODE] == SLIP:
             if goes_back(scene, s, onward(scene, s, slip_of(scene, y, s))):
                 return 1
+        elif scene.state.memory[s, KEPT_MODE] == STICK and is_dragged(scene, y, e):
+            return 1
     return 0
 
 
@@ -200,6 +218,9 @@ def begin_sticking(scene: Scene, y: F1) -> int:
         elif state.touching[s] == 1 and mode != STICK:
             begun = max(begun, 1 if mode == BEGUN else 0)
             changed = max(changed, begin_slot(scene, y, s))
+        elif state.touching[s] == 1 and was_sticking(scene, s) and is_dragged(scene, y, e):
+            v = slip_of(scene, y, s)
+            let_slip(scene, s, v[0], v[1], math.hypot(v[0], v[1]), 0.0)
         mode = state.memory[s, KEPT_MODE]
         sticking = max(sticking, 1 if mode == STICK else 0)
         if (mode == STICK) != was_sticking(scene, s):
@@ -240,7 +261,7 @@ def hold_implied(scene: Scene, t: float, y: F1) -> None:
         released = kept[KEPT_MODE] == SLIP and kept[KEPT_SPEED] == 0.0
         if scene.state.touching[s] == 0 or kept[KEPT_MODE] == STICK or released:
             continue
-        if holds_nothing(scene, s):
+        if holds_nothing(scene, s) or is_dragged(scene, y, e):
             continue
         look_around(scene, y, scene.slots.pair[s], moment)
         fill_hold(scene, t, y, s, moment)
