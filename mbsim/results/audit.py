@@ -133,7 +133,7 @@ FEEDS, FEEDS_ERRORS = 0.3, 0.2
 #: What is said of contacts of meshes that are not convex, where they feed motion.
 NO_POTENTIAL = (
     "its meshes are not convex, and the force on their largest depth has no potential; that of "
-    'contact_depth="FIELD" has one'
+    'contact_depth="FIELD" has one, and takes stiffness over the area'
 )
 #: What is said of overlaps whose force cannot be trusted.
 TOO_DEEP = (

@@ -55,6 +55,24 @@ def test_a_box_sinks_as_deep_however_it_is_cut_and_stands(tmp_path):
     assert sags[0] == pytest.approx(9.81e-5, rel=1e-4)
 
 
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+def test_the_law_is_a_pressure_over_the_face(tmp_path, exponent):
+    # a ring's flat side of the area A is as stiff as with LARGEST where k and c are A times less
+    ring = trimesh.creation.annulus(0.05, 0.1, 0.1, sections=24)
+    area = float(12.0 * np.sin(2.0 * np.pi / 24) * (0.1**2 - 0.05**2))
+    forces = []
+    for depth, share in (("LARGEST", 1.0), ("FIELD", area)):
+        law = (
+            f'contact_depth="{depth}" cnf_type="IMPACT" stiffness="{1e6 / share!r}" '
+            f'exponent="{exponent}" damping="{200.0 / share!r}" dmax="1e-9"'
+        )
+        start = 'v_ic_z="-0.01" v_ic_z_flag="TRUE"'
+        model = GROUND + body(0.05 - 1e-4, start=start) + mesh(200, 20, ring) + contact(law)
+        forces.append(run_deck(tmp_path, model, 1e-3)["contacts/301/force"][0, 2])
+    wanted = 1e6 * 1e-4**exponent + 200.0 * 0.01
+    assert forces == pytest.approx([wanted, wanted], rel=1e-9)
+
+
 def test_volume_is_a_bed_of_the_constrained_modulus(tmp_path):
     model = GROUND + body(0.5) + mesh(200, 20, cube()) + contact(f'{LAYER} damping="300"')
     results = run_deck(tmp_path, model + GRAVITY, 0.6)
