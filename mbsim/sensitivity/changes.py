@@ -30,6 +30,7 @@ from mbsim.sensitivity.along import (
 )
 from mbsim.sensitivity.arrays import (
     ALONG,
+    ASKED,
     CHANGES,
     MOST_CHANGES,
     REMEMBERED,
@@ -76,6 +77,7 @@ def touches(
     if slot < 0:
         # rates of forces were those of another point
         twin.work.slot[:, FOUND_AT] = math.nan
+        V.words[ASKED] += 1
         answer = call_int(p.switching, (p.context, t + s * h, ASK, w[POINT], w[UPPER]))
         if slot == ANY_BRANCH or answer < 0:
             return min(answer, 1)

@@ -32,6 +32,7 @@ from mbsim.dynamics.contact.forces import FOUND_AT, contact_of
 from mbsim.integrators.scheme import in_workspace
 from mbsim.laws.catalog import BRANCHES, UNDECIDED
 from mbsim.sensitivity.arrays import (
+    ASKED,
     BEFORE,
     BY,
     DOWN_SIDE,
@@ -147,6 +148,7 @@ def ask_beside(V: Variations, scene: Scene, t: float, k: int, x: float, late: fl
         w[i] = V.jump[LINE_Y, i] + x * V.next[k, i] + late * V.jump[LINE_F, i]
     # rates of forces were those of another point
     twin.work.slot[:, FOUND_AT] = math.nan
+    V.words[ASKED] += 1
     return min(call_int(p.switching, (p.context, t + late, ASK, w, V.work[WITH])), 0)
 
 
