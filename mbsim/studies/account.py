@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from mbsim import __version__
 from mbsim.studies.distributions import Numbers
 from mbsim.studies.identify import Identified, values_of
 from mbsim.studies.judge import Judged, Parameter, RecordFit
+from mbsim.studies.unknown_curves import UnknownCurve
 
 #: Starts that a page lists.
 _MOST_STARTS = 40
@@ -63,6 +65,7 @@ def facts(found: Identified) -> dict[str, Any]:
             }
             for k, (p, unknown) in enumerate(zip(judged.parameters, problem.unknowns, strict=True))
         },
+        "curves": {c.name: _curve_facts(judged, c) for c in problem.unknown_curves},
         "order": names,
         "covariance": judged.covariance,
         "correlation": judged.correlation,
@@ -94,6 +97,18 @@ def facts(found: Identified) -> dict[str, Any]:
     return _plain_table(about)
 
 
+def _curve_facts(judged: Judged, curve: UnknownCurve) -> dict[str, Any]:
+    """Return what is known of an unknown curve, for JSON."""
+    points = judged.parameters[curve.unknowns]
+    return {
+        "at": curve.at,
+        "value": [p.value for p in points],
+        "estimate": [p.estimate for p in points],
+        "sd": [p.sd for p in points],
+        "interval_95": [p.interval for p in points],
+    }
+
+
 def _plain_table(about: dict[str, Any]) -> dict[str, Any]:
     """Return a table as `plain` has it."""
     return {key: plain(item) for key, item in about.items()}
@@ -120,9 +135,32 @@ def lines_of(found: Identified) -> list[str]:
     values = found.problem.values(found.best.z)
     if found.judged is None:
         return [f"{name} = {value:.6g}" for name, value in values.items()]
-    wide = max(len(p.name) for p in found.judged.parameters)
-    lines = [f"{p.name:<{wide}} = {said(p)}" for p in found.judged.parameters]
+    alone, curves = _alone(found), found.problem.unknown_curves
+    wide = max(len(name) for name in [*(p.name for p in alone), *(c.name for c in curves)])
+    lines = [f"{p.name:<{wide}} = {said(p)}" for p in alone]
+    for curve in curves:
+        lines.append(f"{curve.name:<{wide}} = {_curve_said(found.judged, curve)}")
     return [*lines, found.judged.misfit.text]
+
+
+def _alone(found: Identified) -> list[Parameter]:
+    """Return the parameters that are no ordinates of unknown curves."""
+    judged, curves = found.judged, found.problem.unknown_curves
+    assert judged is not None
+    first = min((curve.first for curve in curves), default=len(judged.parameters))
+    return judged.parameters[:first]
+
+
+def _curve_said(judged: Judged, curve: UnknownCurve) -> str:
+    """Return what is known of an unknown curve in words."""
+    points = judged.parameters[curve.unknowns]
+    known = [p.sd for p in points if p.sd is not None]
+    text = f"{len(points)} points from {curve.at[0]:g} to {curve.at[-1]:g}"
+    if not known:
+        return f"{text}, none of them seen"
+    values = [p.value for p in points]
+    text += f", {min(values):.4g} to {max(values):.4g}, +- {min(known):.2g} to {max(known):.2g}"
+    return text if len(known) == len(points) else f"{text}; {len(points) - len(known)} not known"
 
 
 def said(parameter: Parameter) -> str:
@@ -156,11 +194,12 @@ def page(found: Identified) -> str:
     from mbsim.view.page import static
     from mbsim.view.report import paged
 
-    judged, name = found.judged, found.problem.name
+    problem, judged, name = found.problem, found.judged, found.problem.name
     sections = [("Summary", _summary(found)), ("Warnings", _warnings(found))]
     if judged is not None:
         sections += [
-            ("Parameters", _parameters(judged) + _correlation(judged)),
+            ("Parameters", _parameters(_alone(found)) + _correlation(judged, len(_alone(found)))),
+            ("Curves", "".join(_curve(judged, each) for each in problem.unknown_curves)),
             ("Records", "".join(_record(record) for record in judged.records)),
             ("Misfit", _misfit(judged)),
             ("Identifiability", _identifiability(found, judged)),
@@ -210,12 +249,12 @@ def _warnings(found: Identified) -> str:
     return f"<ul>{''.join(lines)}</ul>"
 
 
-def _parameters(judged: Judged) -> str:
-    """Return the table of the parameters."""
+def _parameters(parameters: Sequence[Parameter]) -> str:
+    """Return the table of parameters."""
     from mbsim.view.report_parts import table
 
     rows: list[list[Any]] = []
-    for p in judged.parameters:
+    for p in parameters:
         low, high = p.interval or (math.nan, math.nan)
         shown: list[Any] = ["-" if p.estimate is None else p.estimate, p.sd or "-"]
         ends = [low, high] if p.interval else ["-", "-"]
@@ -224,11 +263,11 @@ def _parameters(judged: Judged) -> str:
     return table(("parameter", "estimate", "sd", "95 % from", "to", ""), rows)
 
 
-def _correlation(judged: Judged) -> str:
-    """Return the table of correlations between parameters that have an estimate."""
+def _correlation(judged: Judged, count: int) -> str:
+    """Return the table of correlations between those of the first parameters that are known."""
     from mbsim.view.report_parts import table
 
-    known = [k for k, p in enumerate(judged.parameters) if p.sd is not None]
+    known = [k for k, p in enumerate(judged.parameters[:count]) if p.sd is not None]
     if len(known) < 2:
         return ""
     names = [judged.parameters[k].name for k in known]
@@ -237,6 +276,22 @@ def _correlation(judged: Judged) -> str:
         for name, k in zip(names, known, strict=True)
     ]
     return f"<h3>Correlation</h3>{table(('', *names), rows)}"
+
+
+def _curve(judged: Judged, curve: UnknownCurve) -> str:
+    """Return an unknown curve with its band; points that are not known have none."""
+    from mbsim.view.plot_svg import Curve, drawn
+
+    points = judged.parameters[curve.unknowns]
+    values = np.array([p.value for p in points])
+    band = np.array([0.5 * (p.interval[1] - p.interval[0]) if p.interval else 0.0 for p in points])
+    shown = drawn(
+        [Curve("estimate, with 95 % band", curve.at, values, band)], curve.name, "Abscissa"
+    )
+    note = _curve_said(judged, curve)
+    return (
+        f'<figure><h3>{escape(curve.name)}</h3>{shown}</figure><p class="note">{escape(note)}</p>'
+    )
 
 
 def _record(record: RecordFit) -> str:

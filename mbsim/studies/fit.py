@@ -56,30 +56,32 @@ class Fit:
 
 
 def residuals(problem: Problem, z: Numbers, curves: Numbers) -> Numbers:
-    """Return what is squared and summed up, (rows + priors,): of records, then of priors.
+    """Return what is squared and summed up, (rows + priors + bends,), in this order.
 
     A residual is how far a run is off in standard deviations of the noise, times the square root
-    of the record's weight.
+    of the record's weight; of unknown curves it is their second derivatives over what these may be.
     """
     off = (curves - problem.measured) / problem.sd * np.sqrt(problem.weight)
     surprises = [problem.unknowns[k].surprise(float(z[k]))[0] for k in problem.priors]
-    return np.concatenate([off, surprises])
+    values = np.array(list(problem.values(z).values()))
+    return np.concatenate([off, surprises, problem.bends @ values])
 
 
 def rows_of(problem: Problem, z: Numbers, columns: Numbers) -> Numbers:
-    """Return the slopes of `residuals`, (rows + priors, unknowns), of those of the curves."""
+    """Return the slopes of `residuals`, (its size, unknowns), of those of the curves."""
     slopes = columns / problem.sd[:, None] * np.sqrt(problem.weight)[:, None]
     others = np.zeros((len(problem.priors), len(z)))
     for row, k in enumerate(problem.priors):
         others[row, k] = problem.unknowns[k].surprise(float(z[k]))[1]
-    return np.concatenate([slopes, others])
+    wide = [unknown.slope(float(at)) for unknown, at in zip(problem.unknowns, z, strict=True)]
+    return np.concatenate([slopes, others, problem.bends * np.array(wide)])
 
 
 def fit_from(problem: Problem, start: Numbers, fit: Fit, ask: Asking) -> Fit:
     """Fit from a start, `fit` being kept up to date as it goes, and return it."""
     from scipy.optimize import least_squares
 
-    count = len(problem.measured) + len(problem.priors)
+    count = len(problem.measured) + len(problem.priors) + len(problem.bends)
     nothing = np.full(count, np.nan)
 
     def at(z: Numbers) -> Numbers:

@@ -108,7 +108,7 @@ class Misfit:
     """
 
     chi_square: float | None
-    degrees_of_freedom: int
+    degrees_of_freedom: float
     probability: float | None
     s: float
     explained: bool
@@ -153,11 +153,9 @@ def judge(problem: Problem, fit: Fit, checked: Checked) -> Judged:
     columns = np.where(unsettled, 0.0, checked.columns)
     rows = rows_of(problem, fit.z, columns)
     free = ~(_at_bounds(fit.z, rows.T @ off) & large)
-    count = len(problem.measured) + len(problem.priors)
-    plain = off / np.sqrt(_weights(problem))
+    plain = (off / np.sqrt(_weights(problem)))[: len(off) - len(problem.bends)]
     # what the noise is stated to be decides what is seen, unless the residuals are larger
-    directions, seen_count, s = _directions(problem, rows, plain, free, count, names)
-    degrees = max(count - seen_count, 1)
+    directions, degrees, s = _directions(problem, rows, plain, free, names)
     covariance, unbound = _covariance(problem, rows, directions, s, names)
     spread = np.sqrt(np.diag(covariance))
     seen = unbound <= UNSEEN
@@ -189,8 +187,9 @@ def judge(problem: Problem, fit: Fit, checked: Checked) -> Judged:
 
 
 def _weights(problem: Problem) -> Numbers:
-    """Return the weights of all rows of `residuals`; of priors 1."""
-    return np.concatenate([problem.weight, np.ones(len(problem.priors))])
+    """Return the weights of all rows of `residuals`; of priors and of what bends 1."""
+    others = len(problem.priors) + len(problem.bends)
+    return np.concatenate([problem.weight, np.ones(others)])
 
 
 def _at_bounds(z: Numbers, push: Numbers) -> Truths:
@@ -201,15 +200,22 @@ def _at_bounds(z: Numbers, push: Numbers) -> Truths:
 
 
 def _directions(
-    problem: Problem, rows: Numbers, plain: Numbers, free: Truths, count: int, names: list[str]
-) -> tuple[list[Direction], int, float]:
-    """Return the combinations from the best seen on, how many are seen, and the factor s."""
+    problem: Problem, rows: Numbers, plain: Numbers, free: Truths, names: list[str]
+) -> tuple[list[Direction], float, float]:
+    """Return the combinations from the best seen on, degrees of freedom, and the factor s.
+
+    A combination takes as much of a degree as it owes to other rows than those that keep unknown
+    curves smooth (effective number of parameters; T. Hastie, R. Tibshirani, Generalized Additive
+    Models, 1990, section 3.5).
+    """
     _, sizes, axes = np.linalg.svd(rows * free, full_matrices=False)
     keep = [k for k in range(len(sizes)) if np.linalg.norm(axes[k] * free) > 0.5]
     sizes, axes = sizes[keep], axes[keep]
-    seen_count, s = len(sizes), 1.0
+    kept_smooth = rows[len(plain) :] @ (axes * free).T / np.maximum(sizes, 1e-300)
+    takes = 1.0 - np.sum(kept_smooth**2, axis=0)
+    seen_count, s, degrees = len(sizes), 1.0, 1.0
     for _ in range(len(sizes) + 1):
-        degrees = max(count - seen_count, 1)
+        degrees = max(len(plain) - float(np.sum(takes[:seen_count])), 1.0)
         s = math.sqrt(float(plain @ plain) / degrees)
         if problem.is_stated:
             from scipy.stats import chi2
@@ -226,7 +232,7 @@ def _directions(
         noise = 1e-13 * float(sizes[0])
         sd = s / float(size) if size > noise else math.inf
         found.append(Direction({names[k]: float(axis[k]) for k in order}, float(size), sd))
-    return found, seen_count, s
+    return found, degrees if problem.unknown_curves else round(degrees), s
 
 
 def _covariance(
@@ -251,7 +257,7 @@ def _covariance(
     return covariance, np.sqrt(unbound)
 
 
-def _quantile(problem: Problem, degrees: int) -> float:
+def _quantile(problem: Problem, degrees: float) -> float:
     """Return how many standard deviations hold 95 % to both sides."""
     from scipy.stats import norm, t
 
@@ -275,7 +281,7 @@ def _parameter(
     z: Numbers,
     spread: float,
     why: str,
-    degrees: int,
+    degrees: float,
 ) -> Parameter:
     """Return what is known of a parameter; `why` as `Parameter` has it."""
     unknown, place = problem.unknowns[k], float(z[k])
@@ -291,7 +297,7 @@ def _parameter(
 
 
 def _records(
-    problem: Problem, fit: Fit, columns: Numbers, covariance: Numbers, degrees: int
+    problem: Problem, fit: Fit, columns: Numbers, covariance: Numbers, degrees: float
 ) -> list[RecordFit]:
     """Return how each record is met."""
     assert fit.curves is not None
@@ -330,7 +336,7 @@ def _correlation(left: Numbers) -> float:
 
 
 def _misfit(
-    problem: Problem, plain: Numbers, degrees: int, s: float, records: list[RecordFit]
+    problem: Problem, plain: Numbers, degrees: float, s: float, records: list[RecordFit]
 ) -> Misfit:
     """Return whether the model explains the records."""
     together = [record for record in records if record.hangs_together]
@@ -348,7 +354,10 @@ def _misfit(
 
     total = float(plain @ plain)
     chance = float(chi2.sf(total, degrees))
-    about = f"chi-square {total:.4g} with {degrees} degrees of freedom, probability {chance:.2g}"
+    about = (
+        f"chi-square {total:.4g} with {round(degrees, 1)} degrees of freedom, "
+        f"probability {chance:.2g}"
+    )
     explained = chance >= LEAST_CHANCE and not together
     if chance < LEAST_CHANCE:
         text = f"the model does not explain the record: {about}"

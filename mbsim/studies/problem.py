@@ -18,12 +18,13 @@ from mbsim.studies.distributions import Numbers, Spread
 from mbsim.studies.outputs import Output, is_peak, no_curve
 from mbsim.studies.records import TIME, Asked, Record, read_asked, read_record
 from mbsim.studies.study import Case, Study, load_toml, read_options, read_paths
+from mbsim.studies.unknown_curves import UnknownCurve, bends_of, read_curves
 
 if TYPE_CHECKING:
     from mbsim.model.elements import Model
     from mbsim.run.settings import Settings
 
-_TABLES = ("study", "run", "parameters", "set", "records")
+_TABLES = ("study", "run", "parameters", "curves", "set", "records")
 _STUDY = ("model", "starts", "seed", "most_iterations", "jacobian")
 #: With jacobian = "auto" the derivatives of a run end where they have taken so many times its
 #: evaluations: twice what differences take, so that a costly stretch does not decide.
@@ -116,6 +117,7 @@ class Problem:
     most_iterations: int
     notes: tuple[str, ...] = ()
     jacobian: str = "auto"
+    unknown_curves: tuple[UnknownCurve, ...] = ()
 
     @property
     def name(self) -> str:
@@ -200,6 +202,11 @@ class Problem:
         """Which unknowns have a prior."""
         return [k for k, unknown in enumerate(self.unknowns) if unknown.prior is not None]
 
+    @functools.cached_property
+    def bends(self) -> Numbers:
+        """What makes second derivatives of unknown curves, over their sd, of unknowns' values."""
+        return bends_of(self.unknown_curves, self.unknowns)
+
 
 def read_problem(file: str | Path) -> Problem:
     """Return the problem that a TOML file describes.
@@ -222,11 +229,16 @@ def read_problem(file: str | Path) -> Problem:
     if (way := tables["study"].get("jacobian", "auto")) not in JACOBIANS:
         faults.append(f"study.jacobian = {way!r}: must be one of {', '.join(JACOBIANS)}")
     options = {"tol": TIGHT, **read_options(tables["run"], path, faults)}
+    curves, ordinates, points = read_curves(tables["curves"], len(tables["parameters"]), faults)
+    for kind, more in (("parameters", ordinates), ("set", points)):
+        faults += [f"curves: {kind}.{key}: is given too" for key in more.keys() & tables[kind]]
+        tables[kind] = {**tables[kind], **more}
     unknowns = _unknowns(tables["parameters"], faults)
     asked = read_asked(tables["records"], path.parent, tables["parameters"], faults)
     shifts = {one.offset for one in asked if isinstance(one.offset, str)}
     paths = read_paths(tables["parameters"], tables["set"], options, faults, shifts)
-    if any(unknown.prior for unknown in unknowns) and any("sd" not in a.table for a in asked):
+    weighed = bool(curves) or any(unknown.prior for unknown in unknowns)
+    if weighed and any("sd" not in a.table for a in asked):
         faults.append("records: sd: needed where a parameter has a prior, to be weighed against it")
     study = Study(
         file=path,
@@ -248,7 +260,7 @@ def read_problem(file: str | Path) -> Problem:
         ),
     )
     problem = Problem(
-        study, tuple(unknowns), (), about["starts"], about["most_iterations"], jacobian=way
+        study, tuple(unknowns), (), about["starts"], about["most_iterations"], (), way, curves
     )
     stand_ins = {u.name: u.start for u in unknowns}
     for name, table in tables["parameters"].items():
