@@ -30,6 +30,12 @@ _ASIDES = (
 )  # fmt: skip
 #: Numbers that differ by less, over their size, differ by rounding.
 _ROUNDING = 1e-13
+#: Differences over the whole change and over half of it may differ by this part of the largest.
+_SMOOTH = 1e-2
+#: Columns of `Graphics.size` that may be where a polyhedron and a surface are in memory.
+POLYHEDRON, SURFACE = 0, 3
+#: Polyhedra of meshes, which a run keeps beside its arrays.
+_POLYHEDRA = "polyhedra/"
 #: Methods of which derivatives are known.
 _METHODS = ("AUTO", "DOPRI5", "DOP853", "RADAU5", "GALPHA")
 #: Scratch that nothing fills but the build: shapes that stand still.
@@ -139,15 +145,42 @@ def direction(
         with np.errstate(invalid="ignore"):
             slope = weighed(there, change)
         level = _ROUNDING / _CHANGE * np.maximum(np.abs(there[0]), np.abs(there[1])) / size
+        if key.startswith(_POLYHEDRA) and np.any(np.abs(slope) > level):
+            raise ModelError(f"sensitivity: {name} changes corners of a mesh, which is not built")
+        if not _is_smooth(there, change, size):
+            raise ModelError(f"sensitivity: {name} does not change the model smoothly: {key}")
         slope = np.where(np.isfinite(slope) & (np.abs(slope) > level), slope, 0.0)
         if slope.any():
             arrays[key] = slope
     return Direction(name, value, size, arrays, systems, change)
 
 
+def _is_smooth(found: list[Array], change: float, size: float) -> bool:
+    """Return whether differences over the whole change and half of it are alike.
+
+    What is sorted, or chosen among others, is not: its slope would be that of another thing.
+    """
+    with np.errstate(invalid="ignore"):
+        whole = (found[0] - found[1]) / (2.0 * change)
+        half = (found[2] - found[3]) / change
+        finite = np.isfinite(whole) & np.isfinite(half)
+        off = np.where(finite, np.abs(whole - half), 0.0).max(initial=0.0)
+        slope = np.where(finite, np.maximum(np.abs(whole), np.abs(half)), 0.0).max(initial=0.0)
+        value = np.where(np.isfinite(found[0]), np.abs(found[0]), 0.0).max(initial=0.0)
+    return bool(off <= _SMOOTH * slope + 8.0 * _ROUNDING / _CHANGE * value / size)
+
+
 def _tables(system: System) -> dict[str, Array]:
-    """Return the arrays that a parameter may change, by path."""
+    """Return the arrays that a parameter may change, by path; without places in memory."""
     found = dict(tags.arrays(system.scene, tags.CONSTANT))
+    size = system.scene.graphics.size.copy()
+    size[:, SURFACE] = 0.0
+    for g, graphic_id in enumerate(system.graphic_ids):
+        hull = system.model.graphics[graphic_id].hull
+        if hull is not None:
+            size[g, POLYHEDRON] = 0.0
+            found[f"{_POLYHEDRA}{graphic_id}"] = hull
+    found["graphics/size"] = size
     fixed = system.scene.graphics.body == len(system.body_ids)
     found[_FILLED_ONCE] = np.where(fixed[:, None], system.scene.work.frames, 0.0)
     return found

@@ -24,7 +24,7 @@ from mbsim.sensitivity.along import WORK
 from mbsim.sensitivity.arrays import Variations
 from mbsim.sensitivity.hooks import AT, commit_hook, output_hook, rhs_hook
 from mbsim.sensitivity.implicit import STAGES
-from mbsim.sensitivity.parameters import Direction, replaced, weighed
+from mbsim.sensitivity.parameters import SURFACE, Direction, replaced, weighed
 from mbsim.sensitivity.reintegration import MOTIONS
 from mbsim.sensitivity.twin import STEP, STEP_OF_CONTACTS
 
@@ -76,6 +76,12 @@ def twin_of(system: System, directions: Sequence[Direction]) -> System:
     for name, array in tags.arrays(scene, tags.STATE):
         if name.startswith(_OWN_STATE):
             own[name] = array.copy()
+    if "graphics/surfaces" in own:
+        # shapes say where their triangles are
+        size = scene.graphics.size.copy()
+        off = own["graphics/surfaces"].ctypes.data - scene.graphics.surfaces.ctypes.data
+        size[:, SURFACE] += np.where(size[:, SURFACE] != 0.0, float(off), 0.0)
+        own["graphics/size"] = size
     # which linearisation it has is its own
     own["world/hooks"] = scene.world.hooks.copy()
     rows = 2 * len(directions)
@@ -129,8 +135,10 @@ class Sensitivities:
         state = tags.copies(scene, tags.STATE)
         own = {name: tags.at_path(scene, name).copy() for name in direction.arrays}
         for system in direction.systems:
-            for name in own:
-                tags.at_path(scene, name)[...] = tags.at_path(system.scene, name)
+            for name, slope in direction.arrays.items():
+                np.copyto(
+                    tags.at_path(scene, name), tags.at_path(system.scene, name), where=slope != 0.0
+                )
             y = system.y0.copy()
             assemble(self.twin, system, problem, y)
             found.append(y)
