@@ -235,18 +235,19 @@ def _no_programs() -> Programs:
 
 
 class NumberTable:
-    """The numbers of programs, each once; inputs come first, whatever their values are."""
+    """The numbers of programs; inputs come first.
+
+    Each has a row of its own, also where two are the same number: what changes one of them for a
+    derivative leaves the other alone.
+    """
 
     def __init__(self, inputs: list[float]) -> None:
         self.values = list(inputs)
-        self._rows: dict[float, int] = {}
 
     def row(self, value: float) -> int:
         """Return the row of a number, which is no input."""
-        if value not in self._rows:
-            self._rows[value] = len(self.values)
-            self.values.append(value)
-        return self._rows[value]
+        self.values.append(value)
+        return len(self.values) - 1
 
 
 def _table(

@@ -127,7 +127,8 @@ def direction(
             f"sensitivity: {name} cannot be changed to either side of {value:.9g}: {error}"
         ) from None
     tables = [_tables(system) for system in systems]
-    names = {key for table in tables for key in table} | set(_tables(base))
+    own = _tables(base)
+    names = {key for table in tables for key in table} | set(own)
     arrays: dict[str, Array] = {}
     for key in sorted(names):
         found = [table.get(key) for table in tables]
@@ -136,6 +137,10 @@ def direction(
         there = [each for each in found if each is not None]
         if len({each.shape for each in there}) != 1 or len(there) != len(found):
             raise ModelError(f"sensitivity: {name} changes what the model is made of: {key}")
+        if not _is_like(own.get(key), there[0]):
+            raise ModelError(
+                f"sensitivity: at {name}={value:.9g} the model is another one than beside it: {key}"
+            )
         if there[0].dtype.kind == "i":
             if any(not np.array_equal(there[0], each) for each in there[1:]):
                 raise ModelError(f"sensitivity: {name} changes what the model is made of: {key}")
@@ -153,6 +158,13 @@ def direction(
         if slope.any():
             arrays[key] = slope
     return Direction(name, value, size, arrays, systems, change)
+
+
+def _is_like(own: Array | None, beside: Array) -> bool:
+    """Return whether an array of the run is made as one with the parameter changed is."""
+    if own is None or own.shape != beside.shape:
+        return False
+    return own.dtype.kind != "i" or np.array_equal(own, beside)
 
 
 def _is_smooth(found: list[Array], change: float, size: float) -> bool:
