@@ -44,7 +44,9 @@ AGAIN, GONE_OVER = 28, 29
 RUN_TANGENT, OWN_TANGENT, LINEARISED = range(30, 33)
 # whether depths of contacts change in the step that is taken, as in impacts
 COLLIDES = 33
-WORDS = 34
+# whether a force by an expression jumps at the end of the step that is taken
+JUMPS = 34
+WORDS = 35
 #: Rows of `Variations.far` and `depth`: either side of a difference, and the run itself.
 UP_SIDE, DOWN_SIDE, OWN = range(3)
 #: Rows of `Variations.jump`: y before the commit, f before and behind it; y and f of the straight

@@ -40,6 +40,7 @@ from mbsim.sensitivity.arrays import (
     F_BEFORE,
     F_BEHIND,
     GONE_OVER,
+    JUMPS,
     LINE_F,
     LINE_Y,
     LOST_GRAZING,
@@ -51,7 +52,7 @@ from mbsim.sensitivity.arrays import (
     UP_TO,
     Variations,
 )
-from mbsim.sensitivity.changes import ANY_BRANCH, branch_of, crossing
+from mbsim.sensitivity.changes import ANY_BRANCH, branch_of, crossing, jump_at
 from mbsim.sensitivity.twin import half_step, is_asked, keep_change, keep_side, set_parameter
 
 #: Times of changes are looked for along a straight line as long as this part of the problem's own
@@ -63,8 +64,8 @@ SURE = 0.01
 ALIKE = 0.03
 #: So often a smaller difference is tried for the time of a change; so often farther behind it.
 TRIES, TRIES_BEHIND = 4, 10
-#: A jump of f below this part of its size is none.
-NONE = 1e-9
+#: A jump of f below this part of its size is none; where it is found beside the run itself.
+NONE, JUMP = 1e-9, 1e-6
 #: Rows of `Variations.work`: a point, f there, f with one change less.
 POINT, WITH, WITHOUT = range(3)
 
@@ -136,6 +137,23 @@ def note_shifts(V: Variations, scene: Scene, t: float, H: float, k: int) -> None
     if V.asks[last] == 0:
         find_times(V, scene, t, H, k, ANY_BRANCH, last)
         V.shift[k, last] = shift_of(V, k, last)
+
+
+@jitable
+def note_jump(V: Variations, scene: Scene, t: float, H: float) -> None:
+    """Find whether f jumps where an expression goes to another branch at time t.
+
+    At the end of the step it is that behind the jump, and so are sides of differences in its last
+    stages, some of them: what derivatives do there is not known.
+    """
+    V.words[JUMPS] = 0
+    if V.asks[len(V.asks) - 1] > 0:
+        return
+    s, usual = crossing(V, scene, t - H, H, 0, 0.0, ANY_BRANCH, 1.0), 0.0
+    if abs(s) < math.inf:
+        for i in range(len(V.scale)):
+            usual = max(usual, abs(V.jump[F_BEFORE, i]) / V.scale[i])
+        V.words[JUMPS] = 1 if jump_at(V, scene, t - H, H, s) > JUMP * usual * H else 0
 
 
 @jitable
@@ -359,6 +377,9 @@ def cross(V: Variations, scene: Scene, t: float, y: F1, switched: bool) -> None:
     elif code == 0:
         why = LOST_GRAZING if switched else LOST_JUMP
         jump_by(V, V.jump[F_BEFORE], V.jump[F_BEHIND], usual, last, why)
+        for k in range(len(V.size) if switched and V.words[JUMPS] == 1 else 0):
+            if V.shift[k, last] != 0.0:
+                V.reason[k] = LOST_JUMP
     unseen = V.words[REMEMBERED] > 0 and switched and changes_unasked(V, scene)
     for k in range(len(V.size)):
         for i in range(n):

@@ -76,6 +76,7 @@ from mbsim.sensitivity.events import (
     cross,
     list_asking,
     note_changed,
+    note_jump,
     note_kept,
     note_shifts,
 )
@@ -327,6 +328,7 @@ def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int
 def note_changes(V: Variations, scene: Scene, t: float) -> None:
     """Find how the end of a step at which a branch changes moves with every parameter."""
     V.words[STRAIGHT] = 1
+    note_jump(V, scene, t, V.line[0])
     for k in range(len(V.size)):
         if V.lost[k] == math.inf:
             note_shifts(V, scene, t, V.line[0], k)
