@@ -160,7 +160,9 @@ def place_leaf(
 
 
 @jitable
-def measure_pair_of(a: F1, b: F1, ways: int, node: F1, values: F1, other: F1, work: F2) -> bool:
+def measure_pair_of(
+    a: F1, b: F1, ways: int, node: F1, values: F1, other: F1, work: F2, sums: F1
+) -> bool:
     """Fill the node of triangles a of I and b of J; return whether there is any piece.
 
     `values` are the largest psi on the edges of a and of b.
@@ -171,9 +173,9 @@ def measure_pair_of(a: F1, b: F1, ways: int, node: F1, values: F1, other: F1, wo
         values[k] = other[k] = 0.0
     of_a, of_b = corners_of(a, CORNER), corners_of(b, CORNER)
     if ways & I_IN_J and not apart(of_b, corners_of(b, INNER), of_a):
-        piece_in_prism(b, of_a, 1.0, node, values, work)
+        piece_in_prism(b, of_a, 1.0, node, values, work, sums)
     if ways & J_IN_I and not apart(of_a, corners_of(a, INNER), of_b):
-        piece_in_prism(a, of_b, -1.0, node, other, work)
+        piece_in_prism(a, of_b, -1.0, node, other, work, sums)
         for k in range(3):
             values[k] = max(values[k], other[3 + k])
             values[3 + k] = max(values[3 + k], other[k])
@@ -196,7 +198,7 @@ def nodes_of(mesh_i: F1, mesh_j: F1, pose: F1, origin: V3, points: F2) -> tuple[
     """
     count, nodes, values = 0, np.empty((64, PATCH_NUMBERS)), np.empty((64, EDGES))
     pairs = np.empty((64, 2))
-    work = np.empty((2 * CORNERS + SUMS // POLYGON_CORNER, POLYGON_CORNER))
+    work, sums = np.empty((2 * CORNERS, POLYGON_CORNER)), np.empty(SUMS)
     placed_i, placed_j = np.empty((LEAF + 1, PRISM)), np.empty((LEAF + 1, PRISM))
     kept_i, kept_j = np.empty(LEAF + 1, np.int64), np.empty(LEAF + 1, np.int64)
     other, boxes = np.empty(EDGES), np.empty((2, PLACED_BOX))
@@ -222,7 +224,7 @@ def nodes_of(mesh_i: F1, mesh_j: F1, pose: F1, origin: V3, points: F2) -> tuple[
                     pairs = grown(pairs, count)
                 if measure_pair_of(
                     placed_i[a - first_i], placed_j[b - first_j], both, nodes[count],
-                    values[count], other, work,
+                    values[count], other, work, sums,
                 ):  # fmt: skip
                     pairs[count, 0], pairs[count, 1] = a, b
                     count += 1

@@ -96,11 +96,11 @@ def triangles_below(mesh: F1, n: V3, height: float, found: I1) -> int:
 
 @jitable
 def measure_below(
-    mesh: F1, t: int, n: V3, height: float, origin: V3, node: F1, link: F1, work: F2
+    mesh: F1, t: int, n: V3, height: float, origin: V3, node: F1, link: F1, work: F2, sums: F1
 ) -> None:
     """Fill the piece of triangle t below the plane x.n = height, and psi on its edges.
 
-    `work` holds two polygons and the sums.
+    `work` has room for two polygons.
     """
     at = int(mesh[AT_TRIANGLES]) + TRIANGLE * t
     a, b, c = vector(mesh, at), vector(mesh, at + 3), vector(mesh, at + 6)
@@ -109,12 +109,11 @@ def measure_below(
     deep = (here, here + depth[1], here + depth[2])
     for k in range(3):
         link[k] = max(deep[k], deep[k + 1 if k < 2 else 0])
-    polygon, sums = work[CORNERS : 2 * CORNERS], work[2 * CORNERS :].ravel()
-    begin(work)
-    count = cut(work, 3, depth, 3, polygon)
+    begin(work, 0)
+    count = cut(work, 0, 3, depth, 3, CORNERS)
     for k in range(SUMS):
         sums[k] = 0.0
-    integrate(polygon, count, depth, sums)
+    integrate(work, CORNERS, count, depth, sums)
     e1, e2 = sub(b, a), sub(c, a)
     add_piece(node, sums, sub(a, origin), e1, e2, 1.0, 1.0)
     # psi has the slope -n: its integral is the flux of -n psi^2/2
@@ -139,11 +138,11 @@ def pieces_below(mesh: F1, found: I1, n: V3, height: float, origin: V3) -> tuple
     count, marks = len(found), int(mesh[AT_MARKS])
     nodes, links = np.zeros((count, PATCH_NUMBERS)), np.empty((count, 3))
     partners = np.empty((count, 3), np.int64)
-    work = np.empty((2 * CORNERS + SUMS // POLYGON_CORNER, POLYGON_CORNER))
+    work, sums = np.empty((2 * CORNERS, POLYGON_CORNER)), np.empty(SUMS)
     for k in range(count):
         mesh[marks + found[k]] = k
     for k in range(count):
-        measure_below(mesh, found[k], n, height, origin, nodes[k], links[k], work)
+        measure_below(mesh, found[k], n, height, origin, nodes[k], links[k], work, sums)
         at = int(mesh[AT_TRIANGLES]) + TRIANGLE * found[k] + BESIDE
         for e in range(3):
             partners[k, e] = int(mesh[marks + int(mesh[at + e])]) if links[k, e] > 0.0 else -1

@@ -28,48 +28,51 @@ CORNER = 3
 
 
 @jitable
-def begin(polygon: F2) -> int:
-    """Write the whole triangle; return its number of corners."""
-    polygon[0, 0], polygon[0, 1], polygon[0, 2] = 0.0, 0.0, 0.0
-    polygon[1, 0], polygon[1, 1], polygon[1, 2] = 1.0, 0.0, 1.0
-    polygon[2, 0], polygon[2, 1], polygon[2, 2] = 0.0, 1.0, 2.0
+def begin(work: F2, at: int) -> int:
+    """Write the whole triangle into rows from `at` on; return its number of corners."""
+    work[at, 0], work[at, 1], work[at, 2] = 0.0, 0.0, 0.0
+    work[at + 1, 0], work[at + 1, 1], work[at + 1, 2] = 1.0, 0.0, 1.0
+    work[at + 2, 0], work[at + 2, 1], work[at + 2, 2] = 0.0, 1.0, 2.0
     return 3
 
 
 @jitable
-def cut(polygon: F2, count: int, f: V3, tag: int, made: F2) -> int:
-    """Write the part of a convex polygon where f >= 0 into `made`; return its number of corners."""
-    kept = 0
-    after = f[0] + f[1] * polygon[0, 0] + f[2] * polygon[0, 1]
-    for k in range(count):
-        j = k + 1 if k + 1 < count else 0
+def cut(work: F2, at: int, count: int, f: V3, tag: int, to: int) -> int:
+    """Write the part of a convex polygon where f >= 0; return its number of corners.
+
+    The polygon is in rows from `at` on, the part goes to those from `to` on.
+    """
+    kept = to
+    after = f[0] + f[1] * work[at, 0] + f[2] * work[at, 1]
+    for k in range(at, at + count):
+        j = k + 1 if k + 1 < at + count else at
         here = after
-        after = f[0] + f[1] * polygon[j, 0] + f[2] * polygon[j, 1]
+        after = f[0] + f[1] * work[j, 0] + f[2] * work[j, 1]
         if here >= 0.0:
             for c in range(3):
-                made[kept, c] = polygon[k, c]
+                work[kept, c] = work[k, c]
             kept += 1
         if (here >= 0.0) != (after >= 0.0):
             part = here / (here - after)
             for c in range(2):
-                made[kept, c] = polygon[k, c] + part * (polygon[j, c] - polygon[k, c])
+                work[kept, c] = work[k, c] + part * (work[j, c] - work[k, c])
             # an edge that goes out is followed by the cut, one that comes in goes on
-            made[kept, 2] = tag if here >= 0.0 else polygon[k, 2]
+            work[kept, 2] = tag if here >= 0.0 else work[k, 2]
             kept += 1
-    return kept
+    return kept - to
 
 
 @jitable
-def integrate(polygon: F2, count: int, psi: V3, sums: F1) -> None:
-    """Add the integrals of a polygon over du dv to `sums`, and its largest psi."""
-    u0, v0 = polygon[0, 0], polygon[0, 1]
+def integrate(work: F2, at: int, count: int, psi: V3, sums: F1) -> None:
+    """Add the integrals of a polygon in rows from `at` on over du dv to `sums`, its largest psi."""
+    u0, v0 = work[at, 0], work[at, 1]
     p0 = psi[0] + psi[1] * u0 + psi[2] * v0
     sums[MOST] = max(sums[MOST], p0)
-    u1, v1 = polygon[1, 0], polygon[1, 1]
+    u1, v1 = work[at + 1, 0], work[at + 1, 1]
     p1 = psi[0] + psi[1] * u1 + psi[2] * v1
     sums[MOST] = max(sums[MOST], p1)
-    for k in range(2, count):
-        u2, v2 = polygon[k, 0], polygon[k, 1]
+    for k in range(at + 2, at + count):
+        u2, v2 = work[k, 0], work[k, 1]
         p2 = psi[0] + psi[1] * u2 + psi[2] * v2
         sums[MOST] = max(sums[MOST], p2)
         area = 0.5 * ((u1 - u0) * (v2 - v0) - (v1 - v0) * (u2 - u0))
