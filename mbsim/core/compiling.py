@@ -31,8 +31,8 @@ def register() -> None:
         if form is not None:
             overload(function)(form)
         else:
-            given = options or {"error_model": "numpy", "no_cfunc_wrapper": True}
-            register_jitable(**given)(function)
+            usual = {"error_model": "numpy", "no_cfunc_wrapper": True}
+            register_jitable(**(usual | dict(options)))(function)
 
 
 class _Watch(event.Listener):

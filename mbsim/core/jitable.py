@@ -32,6 +32,16 @@ def jitable(function: F) -> F:
     return function
 
 
+def uncounted(function: F) -> F:
+    """Return `function` unchanged, as `jitable`, where it makes no arrays and is called often.
+
+    Of arrays that it is given nobody need count who uses them, which costs a call for each that is
+    passed on. What it calls is compiled so too.
+    """
+    _marked.append(Marked(function, None, {"_nrt": False}))
+    return function
+
+
 def mark(function: Callable[..., Any], **options: Any) -> None:
     """Remember that compiled code may call a function, which is compiled with Numba's options."""
     _marked.append(Marked(function, None, options))

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from mbsim.core.arrays import F1, F2
-from mbsim.core.jitable import jitable
+from mbsim.core.jitable import jitable, uncounted
 from mbsim.geometry.mesh.oriented import I_IN_J, J_IN_I, extent, node_at, ways_between
 from mbsim.geometry.mesh.tree import WAITING
 from mbsim.model.surface import (
@@ -45,7 +45,7 @@ FEW = 2
 EVALUATIONS, WORTH, GROWS, LONGER, PART = 8.0, 2.0, 1.1, 1.5, 0.25
 
 
-@jitable
+@uncounted
 def moved_at_most(mesh: F1, before: F1, pose: F1) -> float:
     """Return the most that a point in the box of a mesh and its layer moved between two poses."""
     at = int(mesh[AT_BOXES]) + NODE + DEEP_BOX

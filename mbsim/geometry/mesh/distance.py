@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from mbsim.core.arrays import F1, V3
-from mbsim.core.jitable import jitable
+from mbsim.core.jitable import jitable, uncounted
 from mbsim.core.rotation import cross, dot, norm, sub, vector
 from mbsim.geometry.mesh.oriented import box_distance, extent, node_at, place
 from mbsim.geometry.mesh.tree import WAITING, leaf_range
@@ -53,7 +53,7 @@ def triangle_of(mesh: F1, t: int) -> tuple[V3, V3, V3]:
     return (vector(mesh, at), vector(mesh, at + 3), vector(mesh, at + 6))
 
 
-@jitable
+@uncounted
 def leaf_distance(mesh_i: F1, i: int, mesh_j: F1, j: int, pose: F1, best: float) -> float:
     """Return the least distance of the triangles of two leaves, or `best` if that is less."""
     first_i, last_i = leaf_range(mesh_i, i)

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from mbsim.core.arrays import F1, F2, I1, I2, V3
-from mbsim.core.jitable import jitable
+from mbsim.core.jitable import jitable, uncounted
 from mbsim.core.rotation import add, dot, norm, scale, vector
 from mbsim.geometry.catalog import (
     AREA,
@@ -113,7 +113,7 @@ def sort_down(values: F1, order: I1) -> None:
         gap //= 2
 
 
-@jitable
+@uncounted
 def told_here(partners: I2, k: int, other: int) -> bool:
     """Return whether the link of node k to another one is taken from k's row: once of both."""
     if other > k:
@@ -169,7 +169,7 @@ def blend(peak: F1, patch: F1, part: float) -> None:
     peak[MEAN] += rest * size / area if area > 0.0 else 0.0
 
 
-@jitable
+@uncounted
 def begin_peak(peak: F1, patch: F1) -> None:
     """Write a peak that stands alone."""
     for k in range(PLACE, AT_NODE):
@@ -178,7 +178,7 @@ def begin_peak(peak: F1, patch: F1) -> None:
     blend(peak, patch, 0.0)
 
 
-@jitable
+@uncounted
 def join(high: F1, low: F1, whole: F1, saddle: float) -> None:
     """Let the lower peak stand out above the saddle only; `whole` is the patch of both."""
     u = max(0.0, 1.0 - saddle / low[0])
@@ -311,7 +311,7 @@ def gather_rest(peaks: F2, count: int, own: int) -> None:
         peaks[own, NORMAL], peaks[own, NORMAL + 1], peaks[own, NORMAL + 2] = force
 
 
-@jitable
+@uncounted
 def moment(peak: F1, p: V3, x: V3, y: V3) -> float:
     """Return the mean of (r.x) (r.y) over a peak's pressure, r from its centre p."""
     m = vector(peak, MOMENTS)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from mbsim.core.arrays import F1, V3
-from mbsim.core.jitable import jitable
+from mbsim.core.jitable import jitable, uncounted
 from mbsim.core.rotation import add, dot, sub, vector
 from mbsim.model.surface import AT_ORIENTED
 from mbsim.model.surface_tree import DEEP, ORIENTED, THIN
@@ -79,7 +79,7 @@ def offset(mesh_i: F1, box_i: int, mesh_j: F1, box_j: int, pose: F1) -> V3:
     return sub(place(pose, vector(mesh_i, box_i)), vector(mesh_j, box_j))
 
 
-@jitable
+@uncounted
 def box_distance(mesh_i: F1, i: int, mesh_j: F1, j: int, pose: F1) -> float:
     """Return a lower bound of the distance of the triangles' boxes of nodes at i and j.
 
@@ -130,7 +130,7 @@ def boxes_meet(
     return gap < reach - flush
 
 
-@jitable
+@uncounted
 def ways_between(mesh_i: F1, i: int, mesh_j: F1, j: int, ways: int, pose: F1, reach: float) -> int:
     """Return for which of `ways` the nodes at i (of I) and j (of J) are nearer than `reach`.
 

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from mbsim.core.arrays import F1, F2, I1, I2, V3
-from mbsim.core.jitable import jitable
+from mbsim.core.jitable import jitable, uncounted
 from mbsim.core.rotation import dot, sub, vector
 from mbsim.geometry.mesh.candidates import candidates
 from mbsim.geometry.mesh.oriented import (
@@ -96,7 +96,7 @@ def corners_of(prism: F1, at: int) -> tuple[V3, V3, V3]:
     return (vector(prism, at), vector(prism, at + 3), vector(prism, at + 6))
 
 
-@jitable
+@uncounted
 def place_boxes(mesh: F1, node: int, pose: F1, moves: bool, origin: V3, boxes: F2) -> None:
     """Write both boxes of a node in J's axes from `origin`: centre, axes by rows, half edges."""
     for k in range(2):
@@ -131,7 +131,7 @@ def reaches(prism: F1, points: int, box: F1) -> bool:
     return True
 
 
-@jitable
+@uncounted
 def place_leaf(
     mesh: F1,
     node: int,
@@ -182,6 +182,30 @@ def measure_pair_of(
     return node[PEAK] > 0.0
 
 
+@uncounted
+def measure_leaves(
+    numbers: tuple[int, int, int, int], placed_i: F2, placed_j: F2, kept_i: I1, kept_j: I1,
+    count: int, nodes: F2, values: F2, pairs: F2, other: F1, work: F2, sums: F1,
+) -> int:  # fmt: skip
+    """Add the nodes of two leaves' triangles, behind the first `count`; return how many there are.
+
+    `numbers` are the first triangle of each leaf and the first behind it, of I and of J.
+    """
+    first_i, last_i, first_j, last_j = numbers
+    for a in range(first_i, last_i):
+        for b in range(first_j, last_j):
+            both = kept_i[a - first_i] & kept_j[b - first_j]
+            if both == 0:
+                continue
+            if measure_pair_of(
+                placed_i[a - first_i], placed_j[b - first_j], both, nodes[count],
+                values[count], other, work, sums,
+            ):  # fmt: skip
+                pairs[count, 0], pairs[count, 1] = a, b
+                count += 1
+    return count
+
+
 @jitable
 def grown(table: F2, count: int) -> F2:
     """Return a table with twice the rows, the first `count` as they are."""
@@ -214,20 +238,13 @@ def nodes_of(mesh_i: F1, mesh_j: F1, pose: F1, origin: V3, points: F2) -> tuple[
         place_leaf(mesh_i, box_i, pose, True, origin, ways, boxes, placed_i, kept_i)
         place_boxes(mesh_i, box_i, pose, True, origin, boxes)
         place_leaf(mesh_j, box_j, pose, False, origin, ways, boxes, placed_j, kept_j)
-        for a in range(first_i, last_i):
-            for b in range(first_j, last_j):
-                both = kept_i[a - first_i] & kept_j[b - first_j]
-                if both == 0:
-                    continue
-                if count == len(nodes):
-                    nodes, values = grown(nodes, count), grown(values, count)
-                    pairs = grown(pairs, count)
-                if measure_pair_of(
-                    placed_i[a - first_i], placed_j[b - first_j], both, nodes[count],
-                    values[count], other, work, sums,
-                ):  # fmt: skip
-                    pairs[count, 0], pairs[count, 1] = a, b
-                    count += 1
+        while count + len(placed_i) * len(placed_j) > len(nodes):
+            nodes, values = grown(nodes, count), grown(values, count)
+            pairs = grown(pairs, count)
+        count = measure_leaves(
+            (first_i, last_i, first_j, last_j), placed_i, placed_j, kept_i, kept_j, count,
+            nodes, values, pairs, other, work, sums,
+        )  # fmt: skip
     return count, nodes, values, pairs
 
 
@@ -256,7 +273,7 @@ def edge_towards(beside: F1, at: int, other: int) -> int:
     return 0
 
 
-@jitable
+@uncounted
 def beyond_edge(mesh_i: F1, mesh_j: F1, table: I1, pairs: F2, values: F2, k: int, e: int) -> int:
     """Return the node beyond edge e of pair k, -1 for none.
 

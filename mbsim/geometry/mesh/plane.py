@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from mbsim.core.arrays import F1, F2, I1, I2, V3
-from mbsim.core.jitable import jitable
+from mbsim.core.jitable import jitable, uncounted
 from mbsim.core.rotation import cross, dot, sub, vector
 from mbsim.geometry.mesh.polygon import CORNER as POLYGON_CORNER
 from mbsim.geometry.mesh.polygon import CORNERS, begin, cut, integrate
@@ -94,7 +94,7 @@ def triangles_below(mesh: F1, n: V3, height: float, found: I1) -> int:
     return many
 
 
-@jitable
+@uncounted
 def measure_below(
     mesh: F1, t: int, n: V3, height: float, origin: V3, node: F1, link: F1, work: F2, sums: F1
 ) -> None:
