@@ -130,7 +130,7 @@ def test_each_way_asks_for_the_boxes_of_its_own():
 def test_the_walk_finds_all_pairs_of_triangles_that_overlap(name):
     mesh, rng = Meshed(*MESHES[name]), np.random.default_rng(4)
     count, size = len(mesh.faces), float(np.ptp(mesh.vertices, axis=0).min())
-    work = np.empty((2 * CORNERS + SUMS // POLYGON_CORNER, POLYGON_CORNER))
+    work, sums = np.empty((2 * CORNERS, POLYGON_CORNER)), np.empty(SUMS)
     a, b = np.empty(PRISM), np.empty(PRISM)
     node, values, other = np.empty(PATCH_NUMBERS), np.empty(EDGES), np.empty(EDGES)
     found = 0
@@ -143,7 +143,7 @@ def test_the_walk_finds_all_pairs_of_triangles_that_overlap(name):
             place_triangle(mesh.data, i, pose, True, origin, a)
             for j in range(count):
                 place_triangle(mesh.data, j, pose, False, origin, b)
-                if measure_pair_of(a, b, I_IN_J | J_IN_I, node, values, other, work):
+                if measure_pair_of(a, b, I_IN_J | J_IN_I, node, values, other, work, sums):
                     if node[PEAK] > 1e-13 * size:
                         assert nodes[told[i, j]] == pytest.approx(node, rel=1e-12, abs=1e-18)
                         found += 1
@@ -216,7 +216,7 @@ def test_the_bound_of_two_triangles_is_no_more_than_their_distance():
 
 def test_what_is_told_apart_has_no_piece():
     rng = np.random.default_rng(3)
-    work = np.empty((2 * CORNERS + SUMS // POLYGON_CORNER, POLYGON_CORNER))
+    work, sums = np.empty((2 * CORNERS, POLYGON_CORNER)), np.empty(SUMS)
     mesh = Meshed(*torus(0.1, 0.03, 16, 8))
     at = int(mesh.data[AT_TRIANGLES])
     told = pieces = 0
@@ -228,7 +228,7 @@ def test_what_is_told_apart_has_no_piece():
         tri = centre + 0.03 * rng.normal(size=(1, 3)) + 0.02 * rng.normal(size=(3, 3))
         corners = tuple(map(tuple, tri))
         node, values = np.zeros(PATCH_NUMBERS), np.zeros(6)
-        piece_in_prism(prism, corners, 1.0, node, values, work)
+        piece_in_prism(prism, corners, 1.0, node, values, work, sums)
         pieces += node[PEAK] > 0.0
         if apart(tuple(map(tuple, outer)), tuple(map(tuple, inner)), corners):
             told += 1
@@ -250,4 +250,4 @@ def test_flush_parts_have_no_incident_and_a_gap_is_found(name):
         points = call("SURFACE-SURFACE", beside, mesh.size, still, mesh.size)
         assert len(incidents(points)[0]) == 0
         assert -points[0, 0] == pytest.approx(gap, rel=1e-9)
-        assert least_gap(mesh.data, mesh.data, pose_of(beside, still)) == pytest.approx(gap)
+        assert least_gap(mesh.data, mesh.data, pose_of(beside, still), 1.0) == pytest.approx(gap)

@@ -67,8 +67,11 @@ def leaf_distance(mesh_i: F1, i: int, mesh_j: F1, j: int, pose: F1, best: float)
 
 
 @jitable
-def least_gap(mesh_i: F1, mesh_j: F1, pose: F1) -> float:
-    """Return a lower bound of the distance of two meshes, above 0 where no triangles meet."""
+def least_gap(mesh_i: F1, mesh_j: F1, pose: F1, part: float) -> float:
+    """Return a lower bound of the distance of two meshes, above 0 where no triangles meet.
+
+    It is at least `part` of the distance, 1 at most: the less is asked for, the sooner it is found.
+    """
     waiting, far = np.empty((4 * WAITING, 2), np.int64), np.empty(4 * WAITING)
     waiting[0, 0], waiting[0, 1], far[0], many = 1, 1, 0.0, 1
     leaves_i, leaves_j = 1 << int(mesh_i[LEVELS]), 1 << int(mesh_j[LEVELS])
@@ -76,7 +79,7 @@ def least_gap(mesh_i: F1, mesh_j: F1, pose: F1) -> float:
     while many > 0 and best > 0.0:
         many -= 1
         i, j = waiting[many, 0], waiting[many, 1]
-        if far[many] >= best:
+        if far[many] >= part * best:
             continue
         if i >= leaves_i and j >= leaves_j:
             best = leaf_distance(mesh_i, i, mesh_j, j, pose, best)
@@ -96,4 +99,4 @@ def least_gap(mesh_i: F1, mesh_j: F1, pose: F1) -> float:
                 waiting[many, c], waiting[many + 1, c] = waiting[many + 1, c], waiting[many, c]
             far[many], far[many + 1] = far[many + 1], far[many]
         many += 2
-    return best
+    return part * best

@@ -184,14 +184,18 @@ def measure_pair_of(
 
 @uncounted
 def measure_leaves(
-    numbers: tuple[int, int, int, int], placed_i: F2, placed_j: F2, kept_i: I1, kept_j: I1,
-    count: int, nodes: F2, values: F2, pairs: F2, other: F1, work: F2, sums: F1,
+    numbers: tuple[int, int, int, int], placed: tuple[F2, F2], kept: tuple[I1, I1], count: int,
+    nodes: F2, values: F2, pairs: F2, room: tuple[F1, F2, F1],
 ) -> int:  # fmt: skip
     """Add the nodes of two leaves' triangles, behind the first `count`; return how many there are.
 
-    `numbers` are the first triangle of each leaf and the first behind it, of I and of J.
+    `numbers` are the first triangle of each leaf and the first behind it, of I and of J; `room` is
+    for the other values on edges, polygons and sums.
     """
     first_i, last_i, first_j, last_j = numbers
+    placed_i, placed_j = placed
+    kept_i, kept_j = kept
+    other, work, sums = room
     for a in range(first_i, last_i):
         for b in range(first_j, last_j):
             both = kept_i[a - first_i] & kept_j[b - first_j]
@@ -242,8 +246,8 @@ def nodes_of(mesh_i: F1, mesh_j: F1, pose: F1, origin: V3, points: F2) -> tuple[
             nodes, values = grown(nodes, count), grown(values, count)
             pairs = grown(pairs, count)
         count = measure_leaves(
-            (first_i, last_i, first_j, last_j), placed_i, placed_j, kept_i, kept_j, count,
-            nodes, values, pairs, other, work, sums,
+            (first_i, last_i, first_j, last_j), (placed_i, placed_j), (kept_i, kept_j), count,
+            nodes, values, pairs, (other, work, sums),
         )  # fmt: skip
     return count, nodes, values, pairs
 

@@ -67,7 +67,7 @@ def field_field(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) ->
     origin = common_middle(mesh_i[root_i:], mesh_j[root_j:], pose)
     count, nodes, values, pairs = nodes_of(mesh_i, mesh_j, pose, origin, points)
     if count == 0:
-        return without_pieces(mesh_i, mesh_j, pose, frame_j, points)
+        return without_pieces(mesh_i, mesh_j, pose, frame_j, points, 1.0)
     partners = partners_of(mesh_i, mesh_j, count, values, pairs)
     at = add(vector(frame_j), to_global(frame_j, origin))
     inside = all_in(mesh_i, mesh_j, nodes[:count])

@@ -189,14 +189,15 @@ def swallowed(mesh_i: F1, mesh_j: F1, pairs: F2, pose: F1) -> bool:
 
 
 @jitable
-def without_pieces(mesh_i: F1, mesh_j: F1, pose: F1, frame_j: F1, points: F2) -> int:
+def without_pieces(mesh_i: F1, mesh_j: F1, pose: F1, frame_j: F1, points: F2, part: float) -> int:
     """Write that no piece of two meshes' surfaces overlaps: they are apart, or one is in the other.
 
-    Within each other, a distance of 0: the pair is looked at again at every step.
+    Their distance is known to a `part` of it. Within each other it is 0: the pair is looked at
+    again at every step.
     """
     if swallowed(mesh_i, mesh_j, np.empty((0, 2)), pose):
         return -far_apart(0.0, frame_j, points)
-    return far_apart(least_gap(mesh_i, mesh_j, pose), frame_j, points)
+    return far_apart(least_gap(mesh_i, mesh_j, pose, part), frame_j, points)
 
 
 @pair("SURFACE", "SURFACE", slots=PATCH_SLOTS, regroups=True, patches=True)
@@ -212,7 +213,7 @@ def surface_surface(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2
     origin = common_middle(mesh_i[root_i:], mesh_j[root_j:], pose)
     count, nodes, values, pairs = nodes_of(mesh_i, mesh_j, pose, origin, points)
     if count == 0:
-        return without_pieces(mesh_i, mesh_j, pose, frame_j, points)
+        return without_pieces(mesh_i, mesh_j, pose, frame_j, points, 1.0)
     pairs, inside = pairs[:count], all_in(mesh_i, mesh_j, nodes[:count])
     partners = partners_of(mesh_i, mesh_j, count, values, pairs)
     peaks = np.empty((count, PEAK_NUMBERS))
