@@ -51,6 +51,8 @@ TOUCHES, THIN = 1e-3, 0.05
 #: Beside the row that carries most, one that carries less than this part is no point: where two
 #: lines cross by a rounding their ends hold them.
 LIGHT_PART = 0.01
+#: How often the time is halved in which a pair comes to overlap.
+HALVES = 10
 #: A gap up to so many times the length that does not count is one of a body that lies on, or slides
 #: along: where it meets is where it is.
 NEAR_ENOUGH = 10.0
@@ -136,6 +138,52 @@ def touching(scene: Scene, S: Stepping, gi: int, gj: int) -> float:
 
 
 @jitable
+def touch_by_bounds(
+    scene: Scene, S: Stepping, y: F1, pair: int, h: float, depth: float, speed: float
+) -> tuple[float, float]:
+    """Return the time at which a pair overlaps first in a step h by `M.way`, and its depth then.
+
+    It goes on by what the bound of their distance, -`depth` now, lets it. A depth of 0 or less is
+    that of a pair that does not overlap.
+    """
+    t = 0.0
+    while depth <= 0.0:
+        if speed * (h - t) < -depth:
+            break
+        t += max(-depth / speed, LEAST_PART * h)
+        if t > h:
+            break
+        depth = measure_ahead(scene, S, y, pair, t)
+    return t, depth
+
+
+@jitable
+def touch_by_halves(
+    scene: Scene, S: Stepping, y: F1, pair: int, h: float, most: float
+) -> tuple[float, float]:
+    """Return the time at which a pair overlaps first in a step h by `M.way`, and its depth then.
+
+    Within the step nothing moves so far that it could pass through the other one: it is looked
+    for between the begin, where it is apart, and the end, until it is no deeper than `most`.
+    """
+    low, t = 0.0, h
+    depth = measure_ahead(scene, S, y, pair, h)
+    for _ in range(HALVES):
+        if depth <= most:
+            break
+        middle = 0.5 * (low + t)
+        other = measure_ahead(scene, S, y, pair, middle)
+        if other > 0.0:
+            t, depth = middle, other
+        else:
+            low = middle
+    if low > 0.0:
+        # the last one that was measured may be apart
+        depth = measure_ahead(scene, S, y, pair, t)
+    return t, depth
+
+
+@jitable
 def find_touch(scene: Scene, S: Stepping, y: F1, pair: int, h: float, depth: float) -> float:
     """Return the time at which a pair overlaps first in a step h by `M.way`, -1 for never.
 
@@ -150,15 +198,19 @@ def find_touch(scene: Scene, S: Stepping, y: F1, pair: int, h: float, depth: flo
     speed += fastest_point(scene, gi, a) + fastest_point(scene, gj, b)
     if not speed < math.inf or (depth <= 0.0 and speed == 0.0):
         return -1.0
+    most = touching(scene, S, gi, gj)
     t = 0.0
-    while depth <= 0.0:
-        if speed * (h - t) < -depth:
+    if depth <= 0.0:
+        thin = 2.0 * min(scene.graphics.thin[gi], scene.graphics.thin[gj])
+        if speed * h < -depth:
             return -1.0
-        t += max(-depth / speed, LEAST_PART * h)
-        if t > h:
+        if speed * h <= THIN * thin:
+            t, depth = touch_by_halves(scene, S, y, pair, h, most)
+        else:
+            t, depth = touch_by_bounds(scene, S, y, pair, h, depth, speed)
+        if depth <= 0.0:
             return -1.0
-        depth = measure_ahead(scene, S, y, pair, t)
-    most, later = touching(scene, S, gi, gj), t
+    later = t
     push_on(scene, S, pair, max(most - depth, 0.0))
     if speed > 0.0:
         size = min(scene.graphics.radius[gi], scene.graphics.radius[gj])
