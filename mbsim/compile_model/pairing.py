@@ -226,7 +226,8 @@ def _kind_of(
 ) -> Kind:
     """Return how graphics like these two are tested in a contact; say what it cannot have."""
     detector = by.detector
-    if contact.contact_depth != "FIELD":
+    if contact.contact_depth != "FIELD" or by.rigid:
+        # rigid contact has no law that would ask how deep it is
         usual = _kind(contact.id, i, j, detector)
         found = _one_region(model, contact, i, j, usual, faults)
         return _as_rigid(found) if by.rigid else found

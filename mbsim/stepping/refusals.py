@@ -27,8 +27,6 @@ def _refused(model: Model) -> Iterator[tuple[str, Mapping[int, Any], str]]:
             yield kind.statement, model.table(kind.name), why
     friction = "friction in joints follows from their reactions, which impulses do not give"
     yield "Force_JointFriction", model.joint_frictions, friction
-    patches = {i: c for i, c in model.contacts.items() if c.contact_depth == "FIELD"}
-    yield "Force_Contact", patches, "a field of depth has no contact points"
     posts = {i: c for i, c in model.contacts.items() if c.cpost is not None}
     yield "Force_Contact", posts, "a CONTACTPOST is asked of compliant contacts"
 

@@ -60,7 +60,6 @@ if TYPE_CHECKING:
     from mbsim.arrays.scene import Scene
     from mbsim.arrays.state import Broadphase
     from mbsim.compile_model.build import System
-    from mbsim.compile_model.pairing import Kind
     from mbsim.compile_model.tangent import Depends
     from mbsim.core.arrays import I1 as Indices
     from mbsim.core.arrays import I2 as Table
@@ -102,6 +101,7 @@ APART = frozenset(
         "FRUSTUM-PLANE",
         "ELLIPSOID-PLANE",
         "MESH-PLANE",
+        "SURFACE-PLANE",
     }
 )
 #: Contact points of a body at most, in the mean.
@@ -255,11 +255,6 @@ def _sides(broadphase: Broadphase, graphics: int) -> Table:
     return side
 
 
-def _is_patch(kind: Kind) -> bool:
-    """Return whether a pair's incidents are areas that have no points."""
-    return kind.has_area and not kind.region
-
-
 def _refuse_reactions(system: System) -> None:
     """Raise if a force looks at reactions while there are contacts, whose impulses do not show."""
     scene, model = system.scene, system.model
@@ -280,12 +275,8 @@ def rigid_mechanism(system: System, fixed: bool, tol: float) -> Made:
 
     scene = system.scene
     for kind in system.plans.kinds:
-        why = ""
-        if _is_patch(kind):
-            why = "touch in patches of triangles, which are no contact points"
-        elif not kind.closed_form:
+        if not kind.closed_form:
             why = "are measured by FCL, which says nothing of how far they are apart"
-        if why:
             contact = system.model.contacts[kind.contact]
             raise ModelError(
                 f"{system.model.file}:{contact.source.line}: Force_Contact[{contact.id}]: "
