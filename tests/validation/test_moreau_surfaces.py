@@ -26,14 +26,15 @@ HALF = {"sphere": 0.1}
 
 
 def body(number, shape, z, cg=(0.0, 0.0, 0.0), yaw=0.0, at=(0.0, 0.0)):
-    """Return a body with its shape's middle at height z; `cg` [m] is beside that."""
+    """Return a body with its shape's middle at height z; `cg` [m] is beside that, in its axes."""
     c, s = math.cos(yaw), math.sin(yaw)
     axes = f'a00="{c!r}" a10="{s!r}" a20="0" a01="{-s!r}" a11="{c!r}" a21="0" '
     axes += 'a02="0" a12="0" a22="1"'
     half = HALF.get(shape, 0.05)
 
     def marker(id, x, y, z):
-        place = f'pos_x="{at[0] + x!r}" pos_y="{at[1] + y!r}" pos_z="{z!r}"'
+        x, y = at[0] + c * x - s * y, at[1] + s * x + c * y
+        place = f'pos_x="{x!r}" pos_y="{y!r}" pos_z="{z!r}"'
         return f'<Reference_Marker id="{id}" body_id="{number}" {place} {axes}/>'
 
     return "\n".join([
