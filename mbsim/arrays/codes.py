@@ -291,8 +291,8 @@ INC_SLOT, INC_POINT, INC_NORMAL, INC_TANGENT, INC_X, INC_DEPTH = 0, 1, 4, 7, 10,
 #: as `State.before` is wide.
 INC_COUPLE, INC_MEMORY = 21, 24
 #: Numbers at the end of a row of `Rows.incidents` where pairs are one incident: area, and moments
-#: xx, xy, yy (see geometry.catalog).
-INC_REGION = 4
+#: xx, xy, yy, then the gain of a patch (see geometry.catalog).
+INC_REGION = 5
 #: Of these, where friction is rigid: what holds along x and y, see laws.friction.stiction.
 INC_STICKING = INC_MEMORY + 3
 

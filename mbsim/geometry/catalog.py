@@ -50,8 +50,12 @@ AT_DEPTH, AT_POINT, AT_NORMAL, AT_WEIGHT, COUPLE = 0, 1, 4, 7, 8
 #: points' part of the force about the incident, in `plane_axes`.
 REGION_ROWS = 2
 AREA, MOMENT_XX, MOMENT_XY, MOMENT_YY = 1, 2, 3, 7
-#: A pair of patches has as many rows for each of them; the second one has the mean depth too.
-MEAN_DEPTH = 4
+#: A pair of patches has as many rows for each of them. The second one has also its gain (how much
+#: deeper the patch gets as the bodies get nearer by 1 along its normal), and how its centre moves:
+#: the force turns against a tilt (wx, wy) of I, in `plane_axes`, with gain times the law's force
+#: times the matrix (yy, -xy; -xy, xx) of its stiffness [L] times that tilt; with its lean (lx, ly)
+#: [1/L] a depth of 1 counts as the tilt (ly, -lx) does.
+GAIN, STIFF_XX, STIFF_XY, STIFF_YY, LEAN_X, LEAN_Y = 4, 5, 6, 8, 9, 10
 
 
 class Pair(NamedTuple):

@@ -111,6 +111,16 @@ def _flats(vertices: Array, faces: Faces, near: float) -> Flats | None:
     return Flats(part, normal, meet == 0, straight)
 
 
+def parts_of(vertices: Array, faces: Faces) -> tuple[Indices, Array]:
+    """Return the flat part of each face of a closed mesh, numbers from 0, and their normals."""
+    flats = _flats(vertices, faces, FLAT * float(np.abs(vertices).max()))
+    if flats is not None:
+        return flats.part, flats.normal
+    normals = _normals(vertices, faces)
+    length = np.linalg.norm(normals, axis=1)
+    return np.arange(len(faces)), normals / np.where(length > 0.0, length, 1.0)[:, None]
+
+
 def _in_line(vertices: Array, ends: Faces, chosen: Marks, near: float) -> Marks:
     """Return which of the chosen vertices lie between the other ends of their two edges."""
     start, end = ends.ravel(), ends[:, ::-1].ravel()

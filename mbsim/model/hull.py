@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from mbsim.core.blend import step
 from mbsim.model.elements import Array
+from mbsim.model.flat_sides import exterior_angles, part_of_side
 from mbsim.model.mesh import Faces, solid_fault
 
 #: A vertex this far (relative to the mesh's size) above a face's plane still counts as on it:
@@ -100,16 +100,6 @@ def _loop(faces: Faces, group: list[int]) -> list[int]:
     return loop if len(loop) == len(after) else []
 
 
-def _exterior(points: Array) -> Array:
-    """Return the exterior angle at every corner of a convex polygon in space."""
-    edge = np.roll(points, -1, axis=0) - points
-    edge = edge / np.linalg.norm(edge, axis=1)[:, None]
-    before = np.roll(edge, 1, axis=0)
-    cross = np.linalg.norm(np.cross(before, edge), axis=1)
-    angle: Array = np.arctan2(cross, (before * edge).sum(axis=1))
-    return angle
-
-
 def _colours(count: int, loops: list[list[int]], corners: Array) -> list[int]:
     """Return a small number a corner, no two alike in one face."""
     beside: list[set[int]] = [set() for _ in range(count)]
@@ -147,14 +137,13 @@ def _patches(corners: Array) -> Array:
 
 
 def _side(corners: Array, loop: list[int], m: Array, beyond: Array) -> float:
-    """Return 1 for a face that a body can lie on, 0 for a facet of a round surface.
+    """Return how far a face is a side that a body can lie on (`flat_sides.part_of_side`).
 
-    A side is over 0.6 of the mesh's size wide (facets: below 0.3), or makes 25 degrees with all
-    its neighbours (facets: 10). `m` is its normal, `beyond` (n, 3) those of its neighbours.
+    `m` is its normal, `beyond` (n, 3) those of its neighbours.
     """
     wide = np.ptp(corners[loop], axis=0).max() / np.ptp(corners, axis=0).max()
     bend = float(np.degrees(np.arccos(np.clip((beyond @ m).max(), -1.0, 1.0))))
-    return float(max(step(float(wide), 0.3, 0.0, 0.6, 1.0), step(bend, 10.0, 0.0, 25.0, 1.0)))
+    return part_of_side(float(wide), bend)
 
 
 def polyhedron_of(vertices: Array, faces: Faces) -> Array | None:
@@ -212,7 +201,7 @@ def _pack(corners: Array, loops: list[list[int]], beyond: dict[tuple[int, int], 
         n = np.cross(ring - ring[0], np.roll(ring, -1, axis=0) - ring[0]).sum(axis=0)
         n = n / np.linalg.norm(n)
         planes.append([*n, float((corners @ n).max())])
-        for corner, angle in zip(loop, _exterior(ring), strict=True):
+        for corner, angle in zip(loop, exterior_angles(ring), strict=True):
             angles[corner][0] += float(angle)
             angles[corner][1] += 1
     weight = np.array([total / count / (0.5 * math.pi) for total, count in angles])

@@ -12,17 +12,19 @@ import numpy as np
 import numpy.typing as npt
 
 from mbsim.model.elements import Array
+from mbsim.model.flat_sides import sides_of
 from mbsim.model.mesh import Faces, joined
 from mbsim.model.surface_tree import NOTHING, level_bounds, oriented_boxes, oriented_order
 
 #: Numbers of the header: triangles, levels of the tree below its root, where boxes, triangles,
 #: marks, oriented boxes (`model.surface_tree`), the first triangles of leaves and those of shells
-#: (what hangs together through edges) and the lists of pairs begin, length of the whole, its volume
-#: [L^3]. Behind the first triangles of shells stands the shell of each triangle.
-HEADER = 11
+#: (what hangs together through edges), the lists of pairs and the flat sides (`model.flat_sides`)
+#: begin, length of the whole, its volume [L^3], its flat sides. Behind the first triangles of
+#: shells stands the shell of each triangle.
+HEADER = 13
 (
     TRIANGLES, LEVELS, AT_BOXES, AT_TRIANGLES, AT_MARKS, AT_ORIENTED, AT_LEAVES, AT_SHELLS,
-    AT_KEPT, LENGTH, SOLID,
+    AT_KEPT, AT_SIDES, LENGTH, SOLID, SIDES,
 ) = range(HEADER)  # fmt: skip
 #: Lists that a mesh keeps, and pairs of leaves of one at most. Which list is given up next (TURN)
 #: stands before them. A list: what tells its pair, how far I may move from a pose until it is not
@@ -40,9 +42,11 @@ NODE = 12
 BOX, DEEP_BOX = 0, 6
 #: Numbers of a triangle: corners, their inner points in the layer and depths of these, the corners
 #: in the order of their numbers in the mesh, the triangles beyond the edges (edge k from corner k
-#: to the next), its number in the mesh, unit normal, the angle-weighted normals of the corners.
-TRIANGLE = 40
+#: to the next), its number in the mesh, unit normal, the angle-weighted normals of the corners, its
+#: flat side (-1: none).
+TRIANGLE = 41
 CORNER, INNER, DEPTH, ORDER, BESIDE, NUMBER, UNIT, CORNER_NORMAL = 0, 9, 18, 21, 24, 27, 28, 31
+SIDE = 40
 
 Indices = npt.NDArray[np.int64]
 
@@ -139,7 +143,9 @@ def pack(
         order, starts = leaves_order(corners.mean(axis=1), levels)
     place = np.empty(count, dtype=np.int64)
     place[order] = np.arange(count)
-    beside, ordered = place[beyond_edges(faces)[order]], faces[order]
+    beyond = beyond_edges(faces)
+    side, sides = sides_of(vertices, faces, beyond)
+    beside, ordered = place[beyond[order]], faces[order]
     corners, below, units = corners[order], below[order], units[order]
 
     low, high = corners.min(axis=1), corners.max(axis=1)
@@ -150,7 +156,7 @@ def pack(
     table = np.hstack([
         corners.reshape(count, 9), below.reshape(count, 9), depth[ordered],
         np.argsort(ordered, axis=1), beside, order[:, None], units,
-        _corner_normals(corners, ordered, units).reshape(count, 9),
+        _corner_normals(corners, ordered, units).reshape(count, 9), side[order][:, None],
     ])  # fmt: skip
     oriented = (
         oriented_boxes(corners, below, units, starts, levels).ravel() if layered else np.zeros(0)
@@ -159,9 +165,9 @@ def pack(
     shell = joined(np.repeat(np.arange(count), 3), beside.ravel(), count)
     shells = np.concatenate([np.unique(shell, return_index=True)[1], shell])
     kept = np.zeros((1 + LISTS * KEPT) * layered)
-    parts = [boxes.ravel(), table.ravel(), marks, oriented, starts, shells, kept]
+    parts = [boxes.ravel(), table.ravel(), marks, oriented, starts, shells, kept, sides]
     at = HEADER + np.cumsum([0, *map(len, parts)])
     a, b, c = (corners - corners.mean(axis=(0, 1))).swapaxes(0, 1)
     solid = float((np.cross(a, b) * c).sum()) / 6.0
-    packed: Array = np.concatenate([[count, levels, *at, solid], *parts])
+    packed: Array = np.concatenate([[count, levels, *at, solid, side.max() + 1], *parts])
     return packed

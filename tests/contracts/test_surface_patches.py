@@ -20,6 +20,7 @@ from helpers.surfaces import (
 )
 from mbsim.geometry.catalog import PAIRS, POINT, REGION_ROWS
 from mbsim.geometry.mesh.merging import (
+    GAIN,
     MOST_PEAKS,
     NORMAL,
     PEAK_NUMBERS,
@@ -389,7 +390,7 @@ def test_nothing_jumps_where_peaks_are_more_than_slots():
     for t in np.linspace(0.0, 3.0, 3001):
         peaks = np.zeros((12, PEAK_NUMBERS))
         peaks[:, 0] = np.maximum(0.0, 1.0 + np.sin(speed * t + phase) - 0.2)
-        peaks[:, 1] = peaks[:, 0] > 0.0
+        peaks[:, 1], peaks[:, GAIN] = peaks[:, 0] > 0.0, 1.0
         peaks[:, PLACE : PLACE + 3], peaks[:, NORMAL : NORMAL + 3], peaks[:, SURFACE] = (
             place,
             away,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from helpers.pairs import entry, frame
-from mbsim.geometry.catalog import AREA, MEAN_DEPTH, PAIRS, POINT, REGION_ROWS
+from mbsim.geometry.catalog import AREA, GAIN, MOMENT_XX, PAIRS, POINT, REGION_ROWS, STIFF_XX
 from mbsim.model.elements import Graphic
 from mbsim.model.surface import pack
 from mbsim.model.surface_layer import layer
@@ -74,14 +74,17 @@ def incidents(points):
 def overlap_volume(points):
     """Return the volume and the area of patches on a plane."""
     _, numbers = incidents(points)
-    return float((numbers[:, AREA] * numbers[:, MEAN_DEPTH]).sum()), float(numbers[:, AREA].sum())
+    # the stiffness of a bed against tilting is that of its moments over its mean depth
+    mean = numbers[:, MOMENT_XX] / numbers[:, STIFF_XX]
+    return float((numbers[:, AREA] * mean).sum()), float(numbers[:, AREA].sum())
 
 
 def wrench(points, step=1, about=(0.0, 0.0, 0.0)):
     """Return force and torque on I of springs of stiffness 1."""
-    down = points[::step]
-    down = down[down[:, 0] > 0.0]
-    force = (down[:, 7] * down[:, 0])[:, None] * down[:, 4:7]
+    touching = points[::step, 0] > 0.0
+    down = points[::step][touching]
+    gain = points[1::step, GAIN][touching] if step == REGION_ROWS else 1.0
+    force = (down[:, 7] * gain * down[:, 0])[:, None] * down[:, 4:7]
     torque = np.cross(down[:, 1:4] - np.asarray(about), force)
     return np.concatenate([force.sum(axis=0), torque.sum(axis=0)])
 

@@ -45,6 +45,7 @@ from mbsim.geometry.catalog import (
     AT_POINT,
     AT_WEIGHT,
     COUPLE,
+    GAIN,
     REGION_ROWS,
 )
 from mbsim.laws.abi import (
@@ -165,6 +166,12 @@ def stands_for_points(scene: Scene, s: int) -> bool:
 def is_patch(scene: Scene, s: int) -> bool:
     """Return whether slot s is a patch, whose pressure has moments."""
     return scene.kinds.step[scene.pairs.kind[scene.slots.pair[s]]] == REGION_ROWS
+
+
+@jitable
+def gain_of(scene: Scene, s: int) -> float:
+    """Return how much the depth of slot s grows as its bodies get nearer by 1."""
+    return scene.work.points[s + 1, GAIN] if is_patch(scene, s) else 1.0
 
 
 @jitable
@@ -308,7 +315,8 @@ def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:
     # how the surfaces move at p
     v = sub(velocity_at(scene, y, bi, p), velocity_at(scene, y, bj, p))
     w = sub(vector(work.w[bi]), vector(work.w[bj]))
-    rate = -dot(v, n)
+    gain = gain_of(scene, s)
+    rate = -gain * dot(v, n)
     tx = tangent(scene, t, y, s, c, gi, bi, bj, n)
     ty = cross(n, tx)
     for k in range(3):
@@ -330,15 +338,16 @@ def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:
     if code != 0:
         return code
     weight = point[AT_WEIGHT]
-    normal, elastic, stored = weight * out[LOAD], weight * out[ELASTIC], weight * out[ENERGY]
-    lost = (normal - elastic) * rate
+    stored, lost = weight * out[ENERGY], weight * (out[LOAD] - out[ELASTIC]) * rate
+    normal, elastic = weight * gain * out[LOAD], weight * gain * out[ELASTIC]
     # of weights that turn with the shapes
     couple = scale(out[ELASTIC] if whole > 0.0 else out[ENERGY], vector(point[COUPLE:]))
     row[FRICTION_STORED] = row[MODE] = row[BRANCH] = 0.0
     if contacts.memory[c] > 0:
         # of a power law F = k d^e, whose energy is F d / (e + 1)
-        row[STIFFNESS] = elastic * elastic / stored - elastic / depth if stored > 0.0 else 0.0
-        over = elastic * depth / stored - 2.0 if stored > 0.0 else 0.0
+        by_depth = elastic * elastic / stored - gain * elastic / depth if stored > 0.0 else 0.0
+        row[STIFFNESS] = by_depth
+        over = elastic * depth / (gain * stored) - 2.0 if stored > 0.0 else 0.0
         row[STIFFENS] = over * rate / depth if abs(over) > CHANGES else 0.0
     if whole > 0.0:
         # see geometry.region

@@ -47,6 +47,7 @@ from mbsim.dynamics.contact.forces import (
     RATE,
     STORED,
     contact_of,
+    gain_of,
     sides,
     velocity_at,
 )
@@ -121,7 +122,9 @@ def first_depth(scene: Scene, t: float, h: float, y: F1) -> float:
             continue
         c = scene.kinds.contact[kind]
         depth, speed = work.slot[s, DEPTH], work.slot[s, RATE]
-        energy = 0.5 * effective_mass(scene, y, s) * speed * speed / work.points[s, AT_WEIGHT]
+        # depth and its rate are the gain times how near, and how fast, bodies get
+        mass = effective_mass(scene, y, s) / (gain_of(scene, s) ** 2 * work.points[s, AT_WEIGHT])
+        energy = 0.5 * mass * speed * speed
         deepest = deepest_of_impact(scene, c, energy)
         allowed = max(3.0 * deepest / 70.0, 1e-3 * contacts.dmax[c])
         if depth > allowed:

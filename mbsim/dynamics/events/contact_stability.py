@@ -28,6 +28,7 @@ from mbsim.dynamics.contact.detection import find_contacts
 from mbsim.dynamics.contact.forces import (
     contact_of,
     face_weight_of,
+    gain_of,
     sides,
     stands_for_points,
     velocity_at,
@@ -43,6 +44,8 @@ from mbsim.geometry.catalog import (
     MOMENT_XX,
     MOMENT_YY,
     REGION_ROWS,
+    STIFF_XX,
+    STIFF_YY,
     plane_axes,
 )
 from mbsim.laws.abi import ELASTIC, ENERGY, FORCE_X_OUT, LOAD, NFORCE_IN, XDOT_IN
@@ -171,6 +174,7 @@ def add_touching(scene: Scene, y: F1, s: int, out: F1) -> None:
     work, bodies, state = scene.work, scene.bodies, scene.state
     point = work.points[s]
     c, depth, weight = contact_of(scene, s), point[AT_DEPTH], point[AT_WEIGHT]
+    weight *= gain_of(scene, s) ** 2
     p, n = vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
     gi, gj = sides(scene, s)
     bi, bj = scene.graphics.body[gi], scene.graphics.body[gj]
@@ -197,7 +201,11 @@ def add_touching(scene: Scene, y: F1, s: int, out: F1) -> None:
         turn = yielding(scene, b, sub(p, position(scene, y, b)), n)
         if face_weight_of(scene, s) > 0.0:
             # tilting about the centre of a patch
-            moments = work.points[s + 1, MOMENT_XX] + work.points[s + 1, MOMENT_YY]
+            numbers = work.points[s + 1]
+            moments = numbers[MOMENT_XX] + numbers[MOMENT_YY]
+            # of corners that are held, those are larger
+            own = gain_of(scene, s) * point[AT_DEPTH] * (numbers[STIFF_XX] + numbers[STIFF_YY])
+            moments = max(moments, own)
             inverse = bodies.inverse[b]
             turn += moments / weight * (inverse[0, 0] + inverse[1, 1] + inverse[2, 2])
         add_to_block(work.block[b], n, both * k, both * damping, turn)

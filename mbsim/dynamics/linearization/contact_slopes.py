@@ -24,6 +24,7 @@ from mbsim.dynamics.contact.forces import (
     contact_of,
     face_weight_of,
     friction,
+    gain_of,
     in_marker,
     patch,
     sides,
@@ -37,11 +38,15 @@ from mbsim.geometry.catalog import (
     AT_NORMAL,
     AT_POINT,
     AT_WEIGHT,
-    MEAN_DEPTH,
+    LEAN_X,
+    LEAN_Y,
     MOMENT_XX,
     MOMENT_XY,
     MOMENT_YY,
     REGION_ROWS,
+    STIFF_XX,
+    STIFF_XY,
+    STIFF_YY,
     plane_axes,
 )
 from mbsim.laws.abi import DFLAG, LOAD
@@ -149,40 +154,58 @@ def friction_slopes(
 
 
 @jitable
-def damp_tilting(scene: Scene, T: Tangent, y: F1, s: int) -> None:
-    """Add the couple against tilting of `contact.tilting`."""
-    add_tilting(scene, T, T.linear.D, y, s, scene.work.slot[s, TILTING])
+def lay_levers(scene: Scene, T: Tangent, y: F1, s: int) -> float:
+    """Fill the levers along n and about both `plane_axes`; return which way these go round n."""
+    point, none, L = scene.work.points[s], (0.0, 0.0, 0.0), T.linear
+    bodies = contact_bodies(scene, s)
+    p, n = vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
+    ax, ay = plane_axes(n)
+    for side in range(2):
+        lever(scene, L, y, bodies[side], p, n, none, L.basis[side, ALONG_N])
+        lever(scene, L, y, bodies[side], p, none, ax, L.basis[side, ABOUT_X])
+        lever(scene, L, y, bodies[side], p, none, ay, L.basis[side, ABOUT_Y])
+    return dot(cross(ax, ay), n)
+
+
+@jitable
+def add_tilting(
+    scene: Scene, T: Tangent, matrix: F3, s: int, moments: tuple[float, float, float]
+) -> None:
+    """Add to K or D a couple against tilting by moments xx, xy, yy of slot s about its levers."""
+    P, nb, (xx, xy, yy) = T.pattern, len(scene.bodies.mass), moments
+    i, j = contact_bodies(scene, s)
+    u, v = T.linear.basis[:, ABOUT_X], T.linear.basis[:, ABOUT_Y]
+    add_two_sided(P, matrix, nb, i, j, -yy, u, u)
+    add_two_sided(P, matrix, nb, i, j, xy, u, v)
+    add_two_sided(P, matrix, nb, i, j, xy, v, u)
+    add_two_sided(P, matrix, nb, i, j, -xx, v, v)
+
+
+@jitable
+def damp_tilting(scene: Scene, T: Tangent, y: F1, s: int) -> float:
+    """Add the couple against tilting of `contact.tilting`; return what `lay_levers` does."""
+    way, numbers = lay_levers(scene, T, y, s), scene.work.points[s + 1]
+    c = scene.work.slot[s, TILTING]
+    moments = (c * numbers[MOMENT_XX], c * numbers[MOMENT_XY], c * numbers[MOMENT_YY])
+    add_tilting(scene, T, T.linear.D, s, moments)
+    return way
 
 
 @jitable
 def resist_tilting(scene: Scene, T: Tangent, y: F1, s: int) -> None:
     """Add the couples of a patch that tilts: of its dampers, and as its centre moves.
 
-    Depth over a flat patch grows by tilt times lever, so its centre of pressure moves by the
-    tilt times the moments over the mean depth.
+    Where its depth changes along the patch, getting deeper moves the centre too.
     """
-    damp_tilting(scene, T, y, s)
-    mean = scene.work.points[s + 1, MEAN_DEPTH]
-    if mean > 0.0:
-        force = scene.work.slot[s, NORMAL] / scene.work.points[s, AT_WEIGHT]
-        add_tilting(scene, T, T.linear.K, y, s, force / mean)
-
-
-@jitable
-def add_tilting(scene: Scene, T: Tangent, matrix: F3, y: F1, s: int, damping: float) -> None:
-    """Add to K or D the couple against tilting by `damping` times the moments of slot s."""
-    P, L, nb, none = T.pattern, T.linear, len(scene.bodies.mass), (0.0, 0.0, 0.0)
-    i, j = contact_bodies(scene, s)
-    point, numbers = scene.work.points[s], scene.work.points[s + 1]
-    p, (ax, ay) = vector(point[AT_POINT:]), plane_axes(vector(point[AT_NORMAL:]))
+    way, numbers, basis = damp_tilting(scene, T, y, s), scene.work.points[s + 1], T.linear.basis
     for side in range(2):
-        lever(scene, L, y, i if side == 0 else j, p, none, ax, L.basis[side, ABOUT_X])
-        lever(scene, L, y, i if side == 0 else j, p, none, ay, L.basis[side, ABOUT_Y])
-    u, v = L.basis[:, ABOUT_X], L.basis[:, ABOUT_Y]
-    add_two_sided(P, matrix, nb, i, j, -damping * numbers[MOMENT_YY], u, u)
-    add_two_sided(P, matrix, nb, i, j, damping * numbers[MOMENT_XY], u, v)
-    add_two_sided(P, matrix, nb, i, j, damping * numbers[MOMENT_XY], v, u)
-    add_two_sided(P, matrix, nb, i, j, -damping * numbers[MOMENT_XX], v, v)
+        for c in range(6):
+            along = way * basis[side, ALONG_N, c]
+            basis[side, ABOUT_X, c] -= numbers[LEAN_Y] * along
+            basis[side, ABOUT_Y, c] += numbers[LEAN_X] * along
+    press = scene.work.slot[s, NORMAL] / scene.work.points[s, AT_WEIGHT]
+    moments = (press * numbers[STIFF_XX], press * numbers[STIFF_XY], press * numbers[STIFF_YY])
+    add_tilting(scene, T, T.linear.K, s, moments)
 
 
 @jitable
@@ -266,8 +289,9 @@ def add_moves_of_centre(scene: Scene, T: Tangent, y: F1, s: int, by_rate: float)
 def normal_slopes(
     scene: Scene, s: int, c: int, depth: float, rate: float
 ) -> tuple[int, float, float]:
-    """Return code, d(normal force)/d(depth) and /d(rate of depth) of the incident in slot s."""
-    contacts, out, weight = scene.contacts, scene.work.law_out, scene.work.points[s, AT_WEIGHT]
+    """Return code and how the normal force in slot s changes as bodies get nearer, and faster."""
+    contacts, out, gain = scene.contacts, scene.work.law_out, gain_of(scene, s)
+    weight = gain * gain * scene.work.points[s, AT_WEIGHT]
     user = contacts.user_normal[c]
     if user != 0:
         inputs = floats_at(user, NORMAL_INPUTS)
@@ -303,7 +327,8 @@ def add_contact_slopes(  # noqa: C901
     point = work.points[s]
     depth, p, n = point[AT_DEPTH], vector(point[AT_POINT:]), vector(point[AT_NORMAL:])
     weight, none = point[AT_WEIGHT], (0.0, 0.0, 0.0)
-    rate = -dot(sub(velocity_at(scene, y, i, p), velocity_at(scene, y, j, p)), n)
+    closing = -dot(sub(velocity_at(scene, y, i, p), velocity_at(scene, y, j, p)), n)
+    rate = gain_of(scene, s) * closing
 
     code, by_depth, by_rate = normal_slopes(scene, s, c, depth, rate)
     if code != 0:

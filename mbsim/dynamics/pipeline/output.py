@@ -77,6 +77,7 @@ from mbsim.geometry.catalog import (
     AT_POINT,
     AT_WEIGHT,
     COUPLE,
+    GAIN,
     MOMENT_XX,
     MOMENT_XY,
     MOMENT_YY,
@@ -196,6 +197,7 @@ def fill_incidents(scene: Scene, h: float, y: F1) -> int:
                 numbers = work.points[s + 1]
                 row[at], row[at + 1] = numbers[AREA], numbers[MOMENT_XX]
                 row[at + 2], row[at + 3] = numbers[MOMENT_XY], numbers[MOMENT_YY]
+                row[at + 4] = numbers[GAIN]
         rigid = scene.contacts.rigid[contact_of(scene, s)]
         if rigid == 1 and work.slot[s, MODE] == STICK:
             # what equations hold, the law can tell only from here

@@ -42,6 +42,7 @@ from mbsim.geometry.catalog import (
     AT_DEPTH,
     AT_WEIGHT,
     COUPLE,
+    GAIN,
     MOMENT_XX,
     MOMENT_XY,
     MOMENT_YY,
@@ -67,6 +68,7 @@ def put_back(scene: Scene, row: F1) -> int:
         numbers, at = work.points[s + 1], len(row) - INC_REGION
         numbers[AREA], numbers[MOMENT_XX] = row[at], row[at + 1]
         numbers[MOMENT_XY], numbers[MOMENT_YY] = row[at + 2], row[at + 3]
+        numbers[GAIN] = row[at + 4]
     state.touching[s] = int(row[INC_FROZEN])
     for k in range(state.before.shape[1]):
         state.before[s, k] = row[INC_MEMORY + k]

@@ -21,10 +21,9 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, norm, scale, sub, vector
 from mbsim.geometry.catalog import (
     AREA,
-    MEAN_DEPTH,
-    MOMENT_XX,
-    MOMENT_XY,
-    MOMENT_YY,
+    AT_DEPTH,
+    GAIN,
+    POINT,
     REGION_ROWS,
     axis,
     plane_axes,
@@ -32,11 +31,12 @@ from mbsim.geometry.catalog import (
     put_point,
 )
 from mbsim.geometry.mesh.merging import (
+    MEAN,
     MOMENTS,
     PEAK_NUMBERS,
-    moment,
     root_of,
     to_local,
+    write_moments,
 )
 from mbsim.geometry.mesh.record import (
     AREA_VECTOR,
@@ -126,17 +126,16 @@ def write_patch(patch: F1, frame: F1, origin: V3, points: F2) -> None:
     rest = sub(vector(patch, TWIST), cross(c, push))
     put_couple(points[0], scale(1.0 / depth, to_global(frame, rest)))
     numbers = points[1]
-    numbers[AREA] = norm(vector(patch, AREA_VECTOR))
-    numbers[MEAN_DEPTH] = size / numbers[AREA] if numbers[AREA] > 0.0 else 0.0
+    for k in range(POINT):
+        numbers[k] = -0.0 if k == AT_DEPTH else 0.0
+    numbers[AREA], numbers[GAIN] = norm(vector(patch, AREA_VECTOR)), 1.0
     spread = np.zeros(PEAK_NUMBERS)
+    spread[MEAN] = size / numbers[AREA] if numbers[AREA] > 0.0 else 0.0
     for k in range(6):
         spread[MOMENTS + k] = patch[SPREAD + k] / patch[PRESSURE]
     x, y = plane_axes(n)
     x, y = to_local(frame, x), to_local(frame, y)
-    weight = size / depth
-    numbers[MOMENT_XX] = weight * moment(spread, c, x, x)
-    numbers[MOMENT_XY] = weight * moment(spread, c, x, y)
-    numbers[MOMENT_YY] = weight * moment(spread, c, y, y)
+    write_moments(spread, c, x, y, size / depth, numbers)
 
 
 @jitable

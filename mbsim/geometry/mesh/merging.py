@@ -21,15 +21,23 @@ from mbsim.core.jitable import jitable, uncounted
 from mbsim.core.rotation import add, dot, norm, scale, vector
 from mbsim.geometry.catalog import (
     AREA,
-    MEAN_DEPTH,
+    AT_DEPTH,
+    LEAN_X,
+    LEAN_Y,
     MOMENT_XX,
     MOMENT_XY,
     MOMENT_YY,
+    POINT,
     REGION_ROWS,
+    STIFF_XX,
+    STIFF_XY,
+    STIFF_YY,
     axis,
     plane_axes,
+    put_couple,
     put_point,
 )
+from mbsim.geometry.catalog import GAIN as GAIN_OF
 from mbsim.geometry.mesh.record import (
     AREA_VECTOR,
     MOMENT,
@@ -46,9 +54,13 @@ LEADS = 1.0 - 1e-9
 #: Incidents of a pair: what peaks beyond that count press, the nearest of those does.
 MOST_PEAKS = 8
 #: Numbers of a peak: depth, weight, then point (3), direction (3), area, mean depth and the moments
-#: of the pressure over itself (xx, yy, zz, xy, yz, zx; about the origin of sums); its node.
-PEAK_NUMBERS = 17
+#: of the pressure over itself (xx, yy, zz, xy, yz, zx; about the origin of sums); its node; then
+#: what `catalog` has of a lying side (`sides`): gain, stiffness against tilting (6, as moments are,
+#: for a unit of the law's force and of the gain) and lean (3), the couple (3), and how its weight
+#: changes as I turns (3).
+PEAK_NUMBERS = 33
 PLACE, NORMAL, SURFACE, MEAN, MOMENTS, AT_NODE = 2, 5, 8, 9, 10, 16
+GAIN, STIFF, LEAN, COUPLE, TURNS = 17, 18, 24, 27, 30
 #: A peak that presses less than this part of the strongest one is none.
 LEAST = 1e-9
 #: A peak's integral of psi is at least this part of its depth times the square of how far it stands
@@ -174,7 +186,9 @@ def begin_peak(peak: F1, patch: F1) -> None:
     """Write a peak that stands alone."""
     for k in range(PLACE, AT_NODE):
         peak[k] = 0.0
-    peak[0], peak[1] = patch[PEAK], 1.0
+    for k in range(GAIN, PEAK_NUMBERS):
+        peak[k] = 0.0
+    peak[0], peak[1], peak[GAIN] = patch[PEAK], 1.0, 1.0
     blend(peak, patch, 0.0)
 
 
@@ -187,18 +201,20 @@ def join(high: F1, low: F1, whole: F1, saddle: float) -> None:
 
 
 @jitable
-def merge(nodes: F2, links: F2, partners: I2, peaks: F2) -> int:
+def merge(nodes: F2, links: F2, partners: I2, on: I1, sides: F2, peaks: F2) -> int:
     """Fill `peaks` (as many rows as nodes) with the peaks that stand out; return their number.
 
     What belongs to a peak is added up in its node; links (n, e) [L] and partners (n, e) are the
-    largest psi on a shared segment and the node beyond it, -1 for none.
+    largest psi on a shared segment and the node beyond it, -1 for none. `on` says on which of the
+    `sides` that lie a node is, -1 for none: a peak there has what stands out of the side.
     """
     count = len(nodes)
     above = np.empty(count, np.int64)
     lead_up(nodes, links, partners, above)
     levels, ends = saddles(above, links, partners)
     found = np.empty(count, np.int64)  # row in `peaks` of a node that is a peak
-    tops = 0
+    tops, held = 0, np.zeros(count)
+    hold_down(nodes, above, on, held)
     for k in range(count):
         top = root_of(above, k)
         if top == k:
@@ -219,6 +235,11 @@ def merge(nodes: F2, links: F2, partners: I2, peaks: F2) -> int:
             a, b = b, a
         add_patch(nodes[a], nodes[b])
         join(peaks[found[a]], peaks[found[b]], nodes[a], levels[order[k]])
+        if on[b] >= 0:
+            # what stands out of a lying side has the weight of a lower peak that does
+            part = held[b] * min(1.0, levels[order[k]] / peaks[found[a], 0])
+            if part > held[a]:
+                on[a], held[a] = on[b], part
         above[b] = a
     for t in range(tops):
         # psi falls by no more than the way: what stands out of a corner of both meshes, where
@@ -226,13 +247,45 @@ def merge(nodes: F2, links: F2, partners: I2, peaks: F2) -> int:
         out = peaks[t, 1] * peaks[t, 0]
         if nodes[int(peaks[t, AT_NODE]), PRESSURE] < ROOM * out * out * peaks[t, 0]:
             peaks[t, 1] = 0.0
+        node = int(peaks[t, AT_NODE])
+        if on[node] >= 0:
+            leave_rest(peaks[t], sides[on[node]], held[node])
     return tops
 
 
 @jitable
+def hold_down(nodes: F2, above: I1, on: I1, held: F1) -> None:
+    """Find for each peak the side that lies there, and how high that is as a part of the peak."""
+    highest = np.zeros(len(above))
+    for k in range(len(above)):
+        top = root_of(above, k)
+        highest[top] = max(highest[top], nodes[k, PEAK])
+    side = np.full(len(above), -1)
+    for k in range(len(above)):
+        top = root_of(above, k)
+        if on[k] >= 0 and nodes[k, PEAK] > held[top] * highest[top]:
+            side[top], held[top] = on[k], nodes[k, PEAK] / highest[top]
+    on[:] = side
+
+
+@jitable
+def leave_rest(peak: F1, side: F1, part: float) -> None:
+    """Leave a peak what the side that lies there does not have, and what turns it over to that.
+
+    `part` is how much of the peak is the side's.
+    """
+    for c in range(3):
+        peak[COUPLE + c] = 0.5 * part * peak[1] * peak[0] * side[TURNS + c]
+    left = 1.0 - part * side[1]
+    side[SURFACE] += (1.0 - left) * peak[SURFACE]
+    peak[SURFACE] *= left
+    peak[1] *= left
+
+
+@jitable
 def presses(peak: F1) -> float:
-    """Return what a peak presses as of a linear law: its weight times its depth."""
-    return peak[0] * peak[1]
+    """Return what a peak presses as of a linear law: weight times gain times depth."""
+    return peak[0] * peak[1] * peak[GAIN]
 
 
 @jitable
@@ -295,7 +348,8 @@ def gather_rest(peaks: F2, count: int, own: int) -> None:
         rest[0] += taken * peaks[k, 0]
         for c in range(PLACE, NORMAL):
             rest[c] += taken * peaks[k, c]
-        for c in range(MEAN, AT_NODE):
+        rest[MEAN] += taken * (peaks[k, MEAN] if peaks[k, MEAN] > 0.0 else peaks[k, 0])
+        for c in range(MOMENTS, AT_NODE):
             rest[c] += taken * peaks[k, c]
         rest[SURFACE] += part * peaks[k, SURFACE]
         peaks[k, 1] *= 1.0 - part
@@ -304,22 +358,50 @@ def gather_rest(peaks: F2, count: int, own: int) -> None:
         if c != SURFACE:
             rest[c] /= total
     size = norm(force)
-    rest[1] = size / rest[0]
-    for c in range(AT_NODE):
-        peaks[own, c] = rest[c]
+    rest[1], rest[GAIN] = size / rest[0], 1.0
+    for c in range(PEAK_NUMBERS):
+        if c != AT_NODE:
+            peaks[own, c] = rest[c]
     if size > 0.0:
         peaks[own, NORMAL], peaks[own, NORMAL + 1], peaks[own, NORMAL + 2] = force
 
 
 @uncounted
-def moment(peak: F1, p: V3, x: V3, y: V3) -> float:
-    """Return the mean of (r.x) (r.y) over a peak's pressure, r from its centre p."""
-    m = vector(peak, MOMENTS)
-    xy, yz, zx = peak[MOMENTS + 3], peak[MOMENTS + 4], peak[MOMENTS + 5]
+def along_both(peak: F1, at: int, x: V3, y: V3) -> float:
+    """Return x.M y of a symmetric matrix (xx, yy, zz, xy, yz, zx) of a peak."""
+    m = vector(peak, at)
+    xy, yz, zx = peak[at + 3], peak[at + 4], peak[at + 5]
     total = m[0] * x[0] * y[0] + m[1] * x[1] * y[1] + m[2] * x[2] * y[2]
     total += xy * (x[0] * y[1] + x[1] * y[0]) + yz * (x[1] * y[2] + x[2] * y[1])
-    total += zx * (x[2] * y[0] + x[0] * y[2])
-    return total - dot(p, x) * dot(p, y)
+    return total + zx * (x[2] * y[0] + x[0] * y[2])
+
+
+@uncounted
+def moment(peak: F1, p: V3, x: V3, y: V3) -> float:
+    """Return the mean of (r.x) (r.y) over a peak's pressure, r from its centre p."""
+    return along_both(peak, MOMENTS, x, y) - dot(p, x) * dot(p, y)
+
+
+@jitable
+def write_moments(peak: F1, p: V3, x: V3, y: V3, weight: float, numbers: F1) -> None:
+    """Write moments and stiffness against tilting of a peak (axes x, y) that acts at p.
+
+    Depth over a bed that tilts grows by tilt times lever, so its centre of pressure moves by the
+    tilt times the moments over the mean depth.
+    """
+    xx, xy, yy = moment(peak, p, x, x), moment(peak, p, x, y), moment(peak, p, y, y)
+    numbers[MOMENT_XX], numbers[MOMENT_XY], numbers[MOMENT_YY] = (
+        weight * xx,
+        weight * xy,
+        weight * yy,
+    )
+    if peak[MEAN] > 0.0:
+        over = weight / peak[MEAN]
+        numbers[STIFF_XX], numbers[STIFF_XY], numbers[STIFF_YY] = over * xx, over * xy, over * yy
+    else:
+        numbers[STIFF_XX] = weight * along_both(peak, STIFF, x, x)
+        numbers[STIFF_XY] = weight * along_both(peak, STIFF, x, y)
+        numbers[STIFF_YY] = weight * along_both(peak, STIFF, y, y)
 
 
 @jitable
@@ -341,10 +423,12 @@ def write_points(peaks: F2, count: int, frame: F1, origin: V3, points: F2) -> No
         n = vector(peak, NORMAL)
         n = to_global(frame, scale(1.0 / norm(n), n))
         p = vector(peak, PLACE)
-        x, y = plane_axes(n)
         put_point(row, peak[0], add(origin, to_global(frame, p)), n, peak[1])
-        numbers[AREA], numbers[MEAN_DEPTH] = peak[SURFACE], peak[MEAN]
+        put_couple(row, to_global(frame, vector(peak, COUPLE)))
+        for c in range(POINT):
+            numbers[c] = -0.0 if c == AT_DEPTH else 0.0
+        numbers[AREA], numbers[GAIN_OF] = peak[SURFACE], peak[GAIN]
+        x, y = plane_axes(n)
         x, y = to_local(frame, x), to_local(frame, y)
-        numbers[MOMENT_XX] = peak[1] * moment(peak, p, x, x)
-        numbers[MOMENT_XY] = peak[1] * moment(peak, p, x, y)
-        numbers[MOMENT_YY] = peak[1] * moment(peak, p, y, y)
+        write_moments(peak, p, x, y, peak[1], numbers)
+        numbers[LEAN_X], numbers[LEAN_Y] = dot(vector(peak, LEAN), x), dot(vector(peak, LEAN), y)

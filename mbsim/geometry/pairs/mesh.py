@@ -32,6 +32,7 @@ from mbsim.geometry.polyhedron import (
     to_global,
     way_out,
 )
+from mbsim.model.flat_sides import LEANS, LIES
 from mbsim.model.hull import (
     AT_CORNERS,
     AT_DATA,
@@ -45,9 +46,6 @@ from mbsim.model.hull import (
     MOST_ROWS,
     ROWS,
 )
-
-#: Cosines of the tilt at which a face of a fine mesh begins to lie (6 degrees) and lies (2).
-LEANS, LIES = 0.9945, 0.9994
 
 
 @jitable

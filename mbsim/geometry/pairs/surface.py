@@ -14,10 +14,12 @@ from mbsim.core.rotation import add, dot, norm, scale, sub, vector
 from mbsim.geometry.catalog import (
     AT_POINT,
     AT_WEIGHT,
+    COUPLE,
     REGION_ROWS,
     axis,
     motion_bound,
     pair,
+    put_couple,
     put_point,
 )
 from mbsim.geometry.mesh.ball import (
@@ -33,6 +35,7 @@ from mbsim.geometry.mesh.ball import (
     through_wall,
     triangles_near,
 )
+from mbsim.geometry.mesh.common_sides import sides_between
 from mbsim.geometry.mesh.distance import least_gap
 from mbsim.geometry.mesh.merging import (
     AT_NODE,
@@ -53,6 +56,7 @@ from mbsim.geometry.mesh.overlap import (
 )
 from mbsim.geometry.mesh.plane import lowest_corner, pieces_below, triangles_below
 from mbsim.geometry.mesh.record import BEYOND, PEAK, VOLUME
+from mbsim.geometry.mesh.sides import join_sides, sides_below
 from mbsim.geometry.mesh.tree import box_square
 from mbsim.geometry.motion import ACCELERATION, ASKED, SPIN, VELOCITY
 from mbsim.geometry.polyhedron import to_global
@@ -98,19 +102,23 @@ def surface_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) 
     found = np.empty(int(mesh[TRIANGLES]), np.int64)
     count = triangles_below(mesh, n, height, found)
     nodes, links, partners = pieces_below(mesh, found[:count], n, height, corner)
-    peaks = np.empty((count, PEAK_NUMBERS))
-    count = merge(nodes, links, partners, peaks)
+    on = np.empty(count, np.int64)
+    flat = sides_below(mesh, found[:count], n, height, corner, nodes, on)
+    peaks = np.empty((count + len(flat), PEAK_NUMBERS))
+    count = merge(nodes, links, partners, on, flat, peaks)
     for k in range(count):
         # what faces up (the inside of a cup's bottom) does not press on the plane
         if dot(vector(peaks[k, NORMAL:]), n) <= 0.0:
             peaks[k, 1] = 0.0
-    count = strongest(peaks, count, MOST_PEAKS)
+    count = strongest(peaks, join_sides(peaks, count, flat), MOST_PEAKS)
     write_points(peaks, count, frame_i, at, points)
     for k in range(0, REGION_ROWS * count, REGION_ROWS):
         # half way between the surface of the mesh and the plane
         p, depth = vector(points[k, AT_POINT:]), points[k, 0]
         p = add(p, scale(-0.5 * depth - dot(sub(p, vector(frame_j)), up), up))
+        couple = vector(points[k, COUPLE:])
         put_point(points[k], depth, p, up, points[k, AT_WEIGHT])
+        put_couple(points[k], couple)
     return len(points)
 
 
@@ -215,15 +223,16 @@ def surface_surface(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2
     if count == 0:
         return without_pieces(mesh_i, mesh_j, pose, frame_j, points, 1.0)
     pairs, inside = pairs[:count], all_in(mesh_i, mesh_j, nodes[:count])
-    partners = partners_of(mesh_i, mesh_j, count, values, pairs)
-    peaks = np.empty((count, PEAK_NUMBERS))
-    count = merge(nodes[:count], values[:count], partners, peaks)
+    partners, on = partners_of(mesh_i, mesh_j, count, values, pairs), np.empty(count, np.int64)
+    flat = sides_between(mesh_i, mesh_j, pose, origin, nodes[:count], pairs, on)
+    peaks = np.empty((count + len(flat), PEAK_NUMBERS))
+    count = merge(nodes[:count], values[:count], partners, on, flat, peaks)
     known = -1 if inside or swallowed(mesh_i, mesh_j, pairs, pose) else 1
     for k in range(count):
         patch = nodes[int(peaks[k, AT_NODE])]
         if patch[BEYOND] > AT_END * patch[PEAK]:
             known = -1
-    count = strongest(peaks, count, MOST_PEAKS)
+    count = strongest(peaks, join_sides(peaks, count, flat), MOST_PEAKS)
     at = add(vector(frame_j), to_global(frame_j, origin))
     write_points(peaks, count, frame_j, at, points)
     return known * len(points)
