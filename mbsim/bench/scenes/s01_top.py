@@ -70,6 +70,6 @@ def _scene(name: str, title: str, top: p.FreeBody, ratio: float) -> Scene:
 
 
 SCENES = (
-    _scene("S1", "free top, 10 rad/s, turns over repeatedly, 10 s", p.S1, 1 / 2),
+    _scene("S1", "free top, 10 rad/s, turns over repeatedly, 10 s", p.S1, 1 / 3),
     _scene("S10c", "free top, 1000 rad/s, 1 s", p.S10C, 1 / 3),
 )

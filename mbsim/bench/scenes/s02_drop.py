@@ -69,7 +69,7 @@ def _scene(name: str, title: str, deck: Callable[[Variation], str], *variants: s
         unit="largest error of the height up to 0.86 s (one bounce) [m]",
         deck=deck,
         errors=_errors,
-        targets=(Target(1 / 20),),
+        targets=(Target(1 / 3),),
         variants=variants,
         second=("z_max", "up to 3 s (six to ten bounces)"),
     )

@@ -56,6 +56,6 @@ SCENES = (
         unit="largest error of the end velocities [m/s]",
         deck=_deck,
         errors=_errors,
-        targets=(Target(1 / 5),),
+        targets=(Target(1 / 3),),
     ),
 )

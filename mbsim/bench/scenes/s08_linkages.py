@@ -160,9 +160,9 @@ def _chain_scene(count: int, ratio: float) -> Scene:
 
 
 SCENES = (
-    _chain_scene(2, 1 / 2),
+    _chain_scene(2, 1 / 3),
     _chain_scene(10, 1 / 3),
-    _chain_scene(40, 1 / 2),
+    _chain_scene(40, 1 / 3),
     Scene(
         name="S8b",
         title="slider-crank, 45 degrees and 10 rad/s at the start, free, 2 s",

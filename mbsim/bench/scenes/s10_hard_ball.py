@@ -53,7 +53,7 @@ SCENES = (
         unit="error of rebound height over drop height",
         deck=_deck,
         errors=_errors,
-        targets=(Target(1 / 5),),
+        targets=(Target(1 / 3),),
         variants=("linear", "linear_noclip", "mujoco"),
     ),
 )
