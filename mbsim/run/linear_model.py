@@ -39,7 +39,7 @@ _AT_REST = 1e-6
 #: Half of the step of differences, of lengths and speeds over the model's own.
 _STEP = 1e-5
 #: A shorter one, as a part of it; what differs to both sides falls by less than that at a kink.
-_FINER, _KINKS = 0.1, 0.5
+_FINER, _JUMPS = 0.1, 0.5
 
 
 class Standing(Protocol):
@@ -234,7 +234,7 @@ def _linearized(run: Standing, outputs: tuple[str, ...], inputs: tuple[str, ...]
         if sides > _DIFFERS * size:
             # a force that bends does so less within a shorter step, at a kink as much
             A, near, C, rates = _differences(run, point, (chosen, V), outputs, _FINER * _STEP)
-            if near > _KINKS * sides:
+            if near > _JUMPS * sides:
                 raise SolverError(
                     f"linearize at time {run.time:.9g}: differences to both sides give other "
                     "slopes: a force has a kink here"

@@ -26,8 +26,8 @@ LINES = {
     "mbsim/dynamics/contact/forces.py": (
         "IGNORE_DEEPER = 0\n",
         "IGNORE_DEEPER, PULL = range(2)\n",
-        "    lost = (normal - elastic) * rate\n",
-        "    lost = (normal - elastic) * rate\n"
+        "    normal, elastic = weight * gain * out[LOAD], weight * gain * out[ELASTIC]\n",
+        "    normal, elastic = weight * gain * out[LOAD], weight * gain * out[ELASTIC]\n"
         "    pull = contacts.numbers[c, PULL]\n"
         "    normal, stored = normal - pull, stored - pull * depth\n",
     ),
