@@ -16,9 +16,7 @@ from mbsim.arrays.codes import AT_ONCE
 from mbsim.core import tags
 from mbsim.core.arrays import F1, F2, F3, I1, I2
 
-#: Speeds at which a coefficient of friction is tabled, and the step of their logarithm's base 2.
-SPEEDS = 64
-# entries of `Rules.number`, of each contact: slip speed of the table's first entry, coefficient
+# entries of `Rules.number`, of each contact: slip speed up to which it sticks, coefficient
 # where it sticks, restitution, closing speed below which there is none, 1 where the coefficient
 # jumps as what sticks yields
 FIRST_SPEED, STICKING, RESTITUTION, SLOWEST, DROPS = range(5)
@@ -102,7 +100,8 @@ class Rules(NamedTuple):
     """What a Force_Contact says of rigid contact."""
 
     number: F2  # (nc, RULE_NUMBERS)
-    curve: F2  # (nc, SPEEDS) coefficient of friction, by slip speed
+    first: I1  # (nc + 1,) of each contact's knots
+    knots: F2  # (all, 2) slip speeds and the coefficients of friction there; straight in between
 
 
 @tags.constant

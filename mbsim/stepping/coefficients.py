@@ -32,14 +32,18 @@ from mbsim.stepping.arrays import (
     RESTITUTION,
     RULE_NUMBERS,
     SLOWEST,
-    SPEEDS,
     STICKING,
     Rules,
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from mbsim.compile_model.build import System
     from mbsim.model.elements import Contact
+
+#: Slip speeds and coefficients of friction there, (rows, 2).
+Knots = np.ndarray[Any, np.dtype[np.float64]]
 
 _LAW = ctypes.CFUNCTYPE(
     ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p
@@ -54,6 +58,9 @@ AT_REST = 1e-12
 SAME = 1e-6
 #: Part of the largest coefficient from which on contact slips.
 NEARLY = 1.0 - 1e-3
+#: Between knots a coefficient is straight to this part of the largest one; speeds that differ by
+#: less than a part of them are one: it jumps there.
+STRAIGHT, ONE_SPEED = 1e-5, 1e-9
 
 
 class Coefficients:
@@ -63,17 +70,19 @@ class Coefficients:
         self.system = system
         self.said: list[str] = []
         contacts = [system.model.contacts[id] for id in system.contact_ids]
-        self.rules = Rules(
-            np.zeros((len(contacts), RULE_NUMBERS)), np.zeros((len(contacts), SPEEDS))
-        )
+        self._number = np.zeros((len(contacts), RULE_NUMBERS))
+        self._tables: dict[tuple[Any, ...], tuple[float, float, Knots]] = {}
+        knots = []
         for c, contact in enumerate(contacts):
-            number = self.rules.number[c]
-            self._friction(c, contact)
-            drop = number[STICKING] - self.rules.curve[c, 0]
+            number = self._number[c]
+            knots.append(self._friction(c, contact))
+            drop = number[STICKING] - knots[c][0, 1]
             number[DROPS] = float(drop > (1.0 - NEARLY) * number[STICKING])
             number[RESTITUTION] = self._restitution(contact)
             if contact.cnf_type == "POISSON":
                 number[SLOWEST] = contact.normal_trans_vel
+        first = np.concatenate([[0], np.cumsum([len(rows) for rows in knots])]).astype(np.int64)
+        self.rules = Rules(self._number, first, np.concatenate([np.zeros((0, 2)), *knots]))
 
     def _name(self, contact: Contact) -> str:
         return element_name(self.system.model.file, "Force_Contact", contact.id)
@@ -83,12 +92,12 @@ class Coefficients:
         where = f"{self.system.model.file}:{contact.source.line}: {self._name(contact)}"
         return ModelError(f"{where}: integrator MOREAU {why}")
 
-    def _friction(self, c: int, contact: Contact) -> None:
-        """Fill the coefficients of friction of a contact."""
-        number, curve = self.rules.number[c], self.rules.curve[c]
+    def _friction(self, c: int, contact: Contact) -> Knots:
+        """Fill the coefficients of friction of a contact; return those of what slides."""
+        number = self._number[c]
         if contact.cff_type == "COULOMB_OFF":
             number[FIRST_SPEED] = math.inf
-            return
+            return np.zeros((1, 2))
         known = contact.cff_type in FRICTION_LAWS
         if known and contact.asks_user and FRICTION_LAWS[contact.cff_type].memory:
             # it is asked for what slides, from within a law that keeps how it was stretched
@@ -107,37 +116,49 @@ class Coefficients:
                 # what such a law keeps is the give that rigid contact has not
                 number[FIRST_SPEED] = AT_REST * float(self.system.scene.world.scale[1])
                 number[STICKING] = max(contact.mu_static, contact.mu_dynamic)
-                curve[:] = contact.mu_dynamic
                 self.said.append(
                     f"{self._name(contact)}: {law.name} as Coulomb's law: it sticks up to "
                     f"{number[STICKING]:g} and slides with {contact.mu_dynamic:g}"
                 )
-                return
+                return np.array([[number[FIRST_SPEED], contact.mu_dynamic]])
         elif contact.asks_user and self.system.user_friction[contact.id].states > 0:
             raise self._refuse(contact, "takes no friction with states")
-        self._table(c, contact)
+        return self._table(c, contact)
 
-    def _table(self, c: int, contact: Contact) -> None:
-        """Fill the coefficients by asking the contact's function."""
-        number, curve = self.rules.number[c], self.rules.curve[c]
+    def _table(self, c: int, contact: Contact) -> Knots:
+        """Fill the coefficients by asking the contact's function; return those of what slides."""
+        number, table = self._number[c], self.system.scene.contacts
+        law = (contact.asks_user and contact.id, int(table.friction_law[c]))
+        key = (*law, table.friction_par[c].tobytes())
+        if key not in self._tables:
+            self._tables[key] = self._ask(c, contact)
+        number[FIRST_SPEED], number[STICKING], knots = self._tables[key]
+        return knots
+
+    def _ask(self, c: int, contact: Contact) -> tuple[float, float, Knots]:
+        """Return up to which slip a contact sticks, its coefficient then, and those beyond."""
         usual = float(self.system.scene.world.scale[1])
         speeds = usual * np.geomspace(SLOWEST_ASKED, FASTEST_ASKED, ASKED)
         mu = np.array([self._asked(c, contact, v) for v in speeds])
-        top = float(mu.max())
+        peak = int(mu.argmax())
+        top = float(mu[peak])
+        if 0.0 < top and 0 < peak < ASKED - 1:
+            top = highest(lambda v: self._asked(c, contact, v), speeds[peak - 1], speeds[peak + 1])
+            top = max(top, float(mu[peak]))
         first = int(np.argmax(mu >= NEARLY * top)) if top > 0.0 else 0
         if top > 0.0 and speeds[first] > usual:
             raise self._refuse(
                 contact,
                 f"cannot read a coefficient of friction: it still grows at a slip of {usual:.3g}",
             )
-        number[FIRST_SPEED], number[STICKING] = speeds[first], top
-        at = speeds[first] * 2.0 ** np.arange(SPEEDS)
-        curve[:] = np.interp(at, speeds, mu)
         if contact.asks_user:
             self.said.append(
                 f"{self._name(contact)}: {contact.cff.fnc_name} gives a coefficient of friction "
                 f"of {top:.4g} up to a slip of {speeds[first]:.3g}, {mu[-1]:.4g} where that is fast"
             )
+        samples = np.column_stack([speeds, mu])[first:]
+        knots = knots_of(lambda v: self._asked(c, contact, v), samples, STRAIGHT * top)
+        return float(speeds[first]), top, knots
 
     def _call(self, c: int, contact: Contact, **changes: Any) -> np.ndarray[Any, Any]:
         """Return Fx, Fy, ... of the contact's law with these inputs changed."""
@@ -214,6 +235,65 @@ class Coefficients:
         if contact.ref_velocity is not None:
             return float(contact.ref_velocity), mass
         return float(scene.world.scale[1]), mass
+
+
+def highest(asked: Callable[[float], float], low: float, high: float) -> float:
+    """Return the largest coefficient at speeds from `low` to `high`, between which it has a peak.
+
+    By golden sections (J. Kiefer, Proc. Amer. Math. Soc. 4 (1953) 502).
+    """
+    part = 0.5 * (math.sqrt(5.0) - 1.0)
+    left, right = high - part * (high - low), low + part * (high - low)
+    at_left, at_right = asked(left), asked(right)
+    while high - low > ONE_SPEED * high:
+        if at_left >= at_right:
+            high, right, at_right = right, left, at_left
+            left = high - part * (high - low)
+            at_left = asked(left)
+        else:
+            low, left, at_left = left, right, at_right
+            right = low + part * (high - low)
+            at_right = asked(right)
+    return max(at_left, at_right)
+
+
+def knots_of(asked: Callable[[float], float], samples: Knots, straight: float) -> Knots:
+    """Return knots of a coefficient: between them it is straight to `straight`.
+
+    Samples (rows, 2) by rising speeds are the begin. Where a curve is not straight between two it
+    is asked between them, until it is; rows that the line through others says as well go.
+    """
+    rows = [(float(v), float(mu)) for v, mu in samples[:1]]
+    for right in samples[1:]:
+        ends = [(float(right[0]), float(right[1]))]
+        while ends:
+            (a, mu_a), (b, mu_b) = rows[-1], ends[-1]
+            middle = 0.5 * (a + b)
+            mu = asked(middle) if b - a > ONE_SPEED * b else 0.5 * (mu_a + mu_b)
+            if abs(mu - 0.5 * (mu_a + mu_b)) > 0.5 * straight:
+                ends.append((middle, mu))
+            else:
+                rows.append(ends.pop())
+    return thinned(np.array(rows), 0.5 * straight)
+
+
+def thinned(rows: Knots, most: float) -> Knots:
+    """Return those of the rows (v, mu) that keep the curve between them within `most` of all."""
+    kept = [0]
+    while kept[-1] < len(rows) - 1:
+        begin, low, high = kept[-1], -math.inf, math.inf
+        last = begin + 1
+        for k in range(begin + 1, len(rows)):
+            way = rows[k, 0] - rows[begin, 0]
+            slope = (rows[k, 1] - rows[begin, 1]) / way
+            if low <= slope <= high:
+                last = k
+            low = max(low, slope - most / way)
+            high = min(high, slope + most / way)
+            if low > high:
+                break
+        kept.append(last)
+    return rows[kept]
 
 
 def rebound(system: System, contact: Contact, speed: float, mass: float) -> float:

@@ -4,9 +4,9 @@ Where joints hold no body of a contact point it is a global problem in the bodie
 
     M v = H r + M v_free,   u = H' v + w,   w = (ahead, 0, 0) of each point,
 
-else a local one, W = H' answer, q = H' v_free + w: joints are in W then. `ahead` is what the gap or
-an impact adds to the normal velocity (`stepping.step.look_ahead`), so that u_N + ahead >= 0 opens.
-mu is that of the step's slip.
+else a local one, W = H' answer, q = H' v_free + w: joints are in W then. `ahead` is what the gap
+or an impact adds to the normal velocity (`stepping.impacts.look_ahead`), so that
+u_N + ahead >= 0 opens. mu is that of the step's slip.
 """
 
 from __future__ import annotations

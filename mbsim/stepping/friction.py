@@ -20,7 +20,6 @@ from mbsim.stepping.arrays import (
     OF_WHOLE,
     OWN_TIME,
     PUSH_SPEED,
-    SPEEDS,
     STICKING,
     W_XX,
     W_ZZ,
@@ -32,8 +31,8 @@ from mbsim.stepping.one_point import apply, slip_at, solve_point, velocity_of
 #: Closing and slipping are none up to so many times what the solver may leave of a velocity at
 #: most, however short a step.
 NOISE_OF_SPEED = 30.0
-#: Changes of mu that do not count.
-YIELDS = 1e-3
+#: Changes of mu that do not count, over tol, and at most.
+YIELDS, LARGEST_YIELD = 10.0, 1e-3
 #: A load as large as it may be.
 SATURATED = 1.0 - 1e-9
 #: Loads from which on they are to be known, and how well, over tol.
@@ -64,14 +63,20 @@ def noise_of(S: Stepping, h: float) -> float:
 @jitable
 def coefficient(S: Stepping, c: int, slip: float) -> float:
     """Return the coefficient of friction of contact c at a slip speed."""
-    numbers, curve = S.rules.number[c], S.rules.curve[c]
+    numbers, knots = S.rules.number[c], S.rules.knots
     if slip <= numbers[FIRST_SPEED]:
         return numbers[STICKING]
-    at = math.log2(slip / numbers[FIRST_SPEED])
-    k = int(at)
-    if k >= SPEEDS - 1:
-        return curve[SPEEDS - 1]
-    return curve[k] + (at - k) * (curve[k + 1] - curve[k])
+    low, high = S.rules.first[c], S.rules.first[c + 1] - 1
+    if slip >= knots[high, 0]:
+        return knots[high, 1]
+    while high - low > 1:
+        middle = (low + high) // 2
+        if knots[middle, 0] <= slip:
+            low = middle
+        else:
+            high = middle
+    part = (slip - knots[low, 0]) / (knots[high, 0] - knots[low, 0])
+    return knots[low, 1] + part * (knots[high, 1] - knots[low, 1])
 
 
 @jitable
@@ -99,6 +104,8 @@ def let_yield(S: Stepping, count: int, noise: float) -> bool:
     it yields (`part_to_yield`).
     """
     P, M, changed, begin = S.points, S.motion, False, 0
+    tol = S.plan.number[LEFT_SPEED] / S.plan.number[PUSH_SPEED]
+    least = 1.0 - min(YIELDS * tol, LARGEST_YIELD)
     while begin < count:
         end = begin + 1
         while end < count and P.key[end] == P.key[begin]:
@@ -114,7 +121,7 @@ def let_yield(S: Stepping, count: int, noise: float) -> bool:
             if load < SATURATED and slip <= noise:
                 continue
             mu = coefficient(S, P.contact[k], slip)
-            if mu < (1.0 - YIELDS) * P.mu[k]:
+            if mu < least * P.mu[k]:
                 P.mu[k] = mu
                 changed = True
         begin = end
