@@ -286,12 +286,15 @@ def _harmonic(parts: Sequence[Bound]) -> Bound:
 def _chirp(parts: Sequence[Bound]) -> Bound:
     """Return SWEEP(x, a, x0, f0, x1, f1, dx)."""
     x, a, x0, f0, x1, f1, dx = parts
-    zero, growth = number(0.0), sub(f1, f0)
-    way = _minimum([largest(sub(x, x0), zero), sub(x1, x0)])
-    cycles = add(
-        times(f0, x), times(over(growth, times(number(2.0), sub(x1, x0))), times(way, way))
-    )
+    zero, growth, rise = number(0.0), sub(f1, f0), sub(x1, x0)
+    way = _minimum([largest(sub(x, x0), zero), rise])
+    first, last = times(f0, x), sub(times(f1, x), times(number(0.5), times(growth, add(x1, x0))))
+    cycles = add(first, times(over(growth, times(number(2.0), rise)), times(way, way)))
     cycles = add(cycles, times(growth, largest(sub(x, x1), zero)))
+    # without width the frequency jumps, and the division by it says nothing
+    cycles = where(rise.value.lo > 0.0, cycles, either(first, last, 0))
+    behind = (x.value.lo >= x1.value.hi) & (x.value.lo > x0.value.hi)
+    cycles = where(x.value.hi <= x0.value.lo, first, where(behind, last, cycles))
     on = _blend((x, x0, zero, add(x0, dx), number(1.0)), "STEP5")
     return times(times(on, a), sine(times(number(2.0 * math.pi), cycles)))
 

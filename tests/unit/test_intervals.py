@@ -39,6 +39,8 @@ TEXTS = [
     "POLY(TIME, 1, 1, 2, 3) + CHEBY(TIME, 1, 1, 2, 3, 4)",
     "FORSIN(TIME, .1, 3, 1, 2, 3) - FORCOS(TIME, .1, 3, 1, 2, 3)",
     "SWEEP(TIME, 1, .2, 1, 1.5, 7, .2)",
+    "SWEEP(TIME, 1, 1, 2, 1, 5, 0)",
+    "SWEEP(TIME, 1, 1, 2, 0.5, 5, -1)",
     "IMPACT(TIME, 1, 1.1, 10, 1.5, 2, .1)",
     "BISTOP(TIME, 1, .5, 1.2, 10, 1.5, 2, .1)",
     "100*SIN(2*PI*TIME)**400",
