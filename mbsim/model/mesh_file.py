@@ -5,6 +5,7 @@ The one file that imports trimesh, and only when a deck names a mesh file.
 
 from __future__ import annotations
 
+import codecs
 import io
 from pathlib import Path
 from typing import NamedTuple
@@ -20,6 +21,8 @@ FORMATS = ("stl", "obj", "off", "ply", "glb", "gltf", "3mf")
 MAX_BYTES = 512 * 2**20
 _LARGEST = 1e40
 _NORMALS = "normals"
+#: Bytes of a binary STL before its triangles, and of each; where the first facet of a text is.
+_STL_HEADER, _STL_TRIANGLE, _STL_LOOK = 84, 50, 4096
 
 
 class MeshFile(NamedTuple):
@@ -86,10 +89,48 @@ def _decode(data: bytes, kind: str) -> MeshFile:
             from mbsim.model.mesh_3mf import read_3mf
 
             return MeshFile(*read_3mf(data, MAX_BYTES))
-        return _by_trimesh(data, kind)
+        return _by_trimesh(_in_utf8(data, kind), kind)
     except Exception as error:  # a damaged file makes its parser raise anything
         reason = " ".join(str(error).split())[:100] or type(error).__name__
         raise ModelError(f"is no readable {kind.upper()} file: {reason}") from None
+
+
+def _in_utf8(data: bytes, kind: str) -> bytes:
+    """Return a file with its text in UTF-8: names and comments may be in another code."""
+    if kind == "stl" and not _is_text_stl(data):
+        return data
+    if kind in ("stl", "obj", "off"):
+        return data if data.isascii() else _text(data).encode()
+    if kind == "ply":
+        header, end, body = data.partition(b"end_header")
+        return _text(header).encode() + end + body
+    return data
+
+
+def _text(data: bytes) -> str:
+    """Return text in UTF-8, in UTF-16 with its mark, else in Latin-1, where any byte is a sign."""
+    if data[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+        return data.decode("utf-16")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+def _is_text_stl(data: bytes) -> bool:
+    """Return whether an STL is text; a binary one has as many bytes as its header tells."""
+    count = int.from_bytes(data[80:84], "little")
+    whole = _STL_HEADER + _STL_TRIANGLE * count
+    if len(data) == whole:
+        return False
+    if b"facet" in data[:_STL_LOOK].lower() or not data.strip(b"\0 \r\n\t"):
+        return True
+    if data[:5].lower() == b"solid" and data.isascii():
+        return True
+    raise ValueError(
+        f"{len(data)} bytes, where a binary one of {count} triangles has {whole}; nor is it text "
+        "with facets"
+    )
 
 
 def _by_trimesh(data: bytes, kind: str) -> MeshFile:

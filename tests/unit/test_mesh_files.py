@@ -190,3 +190,31 @@ def test_damaged_files_of_scenes(tmp_path: Path, suffix: str, data: bytes) -> No
     with pytest.raises(ModelError) as caught:
         load_mesh(path)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", ["stl_ascii", "obj", "off", "ply", "ply_ascii"])
+@pytest.mark.parametrize("code", ["latin-1", "utf-8"])
+def test_names_in_a_mesh_file_may_be_in_any_code(tmp_path: Path, kind: str, code: str) -> None:
+    name = "Gehäuse groß".encode(code)
+    binary, _, _ = kind.partition("_")
+    how = {"encoding": "ascii"} if kind == "ply_ascii" else {}
+    data = CUBE.export(file_type="stl_ascii" if kind == "stl_ascii" else binary, **how)
+    data = data if isinstance(data, bytes) else data.encode()
+    _, _, rest = data.partition(b"\n")
+    comment = {"stl": b"solid " + name, "obj": b"# " + name, "off": b"OFF\n# " + name}
+    head = comment.get(binary, b"ply")
+    if binary == "ply":
+        rest = rest.replace(b"element vertex", b"comment " + name + b"\nelement vertex", 1)
+    path = tmp_path / f"part.{binary}"
+    path.write_bytes(head + b"\n" + rest)
+    mesh = load_mesh(path)
+    assert polyhedron(mesh.vertices, mesh.faces).volume == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize("change", [slice(None, -7), slice(None, 200)])
+def test_a_cut_stl_tells_its_bytes(tmp_path: Path, change: slice) -> None:
+    path = tmp_path / "part.stl"
+    path.write_bytes(CUBE.export(file_type="stl")[change])
+    size = path.stat().st_size
+    with pytest.raises(ModelError, match=f"{size} bytes, where a binary one of 12 triangles has"):
+        load_mesh(path)
