@@ -68,11 +68,14 @@ def command(
         if bar:
             bar.stop()
     about = facts(found)
-    _write(found, folder, about)
+    # said before it is written: a full disk takes nothing of what the runs have found
     if as_json:
         print_json(about)
     else:
-        _show(found, folder)
+        _show(found)
+    _write(found, folder, about)
+    if not as_json:
+        _show_files(found, folder)
     if found.stopped and found.stopped_by == 0:
         raise ResultsError(f"stopped: the best so far is in {folder}")
     if found.stopped:
@@ -93,12 +96,16 @@ def _write(found: Identified, folder: Path, about: dict[str, object]) -> None:
     write_product(folder / f"{name}.html", page(found), "page")
 
 
-def _show(found: Identified, folder: Path) -> None:
+def _show(found: Identified) -> None:
     """Print what came of it."""
     from mbsim.studies.account import lines_of
 
     for line in lines_of(found):
         echo(line)
+
+
+def _show_files(found: Identified, folder: Path) -> None:
+    """Print what was written and how many runs it took, and warn of what is wrong."""
     failed = sum(count for count, _ in found.reasons)
     name = found.problem.name
     echo(

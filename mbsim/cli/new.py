@@ -9,6 +9,7 @@ import click
 
 from mbsim.cli.messages import echo
 from mbsim.errors import ModelError
+from mbsim.results.files import problem
 
 #: Starters: what each is, and the files that it has, as they are named here -> as they are written.
 STARTERS = {
@@ -42,14 +43,20 @@ def command(kind: str, folder: Path) -> None:
     there = [str(path) for path in texts if path.exists() or path.is_symlink()]
     if there:
         raise ModelError(f"{', '.join(there)}: there already; name another folder")
+    made: list[Path] = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for path, text in texts.items():
             with path.open("x", encoding="utf-8") as file:
+                made.append(path)
                 file.write(text)
     except OSError as error:
-        place = error.filename or folder
-        raise ModelError(f"{place}: cannot be written: {error.strerror}") from None
+        # half a deck is none, and would be in the way of a second try
+        for path in made:
+            path.unlink(missing_ok=True)
+        if isinstance(error, FileExistsError | NotADirectoryError):
+            raise ModelError(f"{error.filename}: is no folder; name another one") from None
+        raise problem(Path(error.filename or folder), error, "the deck") from None
     deck = folder / f"{kind}.xml"
     echo(f"{deck}: {about}")
     for path in list(texts)[1:]:

@@ -317,7 +317,9 @@ def _new_file(path: Path, *, keep: bool = False) -> Iterator[h5py.File]:
     except MbsimError:
         raise
     except (OSError, RuntimeError, ValueError) as error:
-        raise ResultsError(f"{path}: cannot be written: {_short(error)}") from None
+        number = getattr(error, "errno", None)
+        reason = os.strerror(number) if number else _short(error)
+        raise ResultsError(f"{path}: cannot be written: {reason}") from None
     finally:
         if temporary is not None:
             temporary.unlink(missing_ok=True)

@@ -48,6 +48,6 @@ def check(
     if free is not None and rows * size > free:
         raise ModelError(
             f"{rows:.9g} output rows of {size} bytes would take {rows * size / 1e9:.3g} GB "
-            f"{place}, where {free / 1e9:.3g} GB are free; give a longer --print-interval, an "
-            "earlier --end-time, or --signals"
+            f"{place}, where {max(free, 0) / 1e9:.3g} GB are free; give a longer "
+            "--print-interval, an earlier --end-time, or --signals"
         )

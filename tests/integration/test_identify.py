@@ -25,8 +25,9 @@ from helpers.measured import (
     text_of,
     write_record,
 )
+from helpers.minimal_deck import deck
 from mbsim.cli.main import main
-from mbsim.errors import ModelError
+from mbsim.errors import ModelError, ResultsError
 from mbsim.studies.identify import identify
 from mbsim.studies.problem import read_problem
 from mbsim.studies.stopping import Stop
@@ -370,3 +371,24 @@ def test_a_cluster_and_two_processes_find_the_same_bit_for_bit(tmp_path):
             other = identify(problem, pool)
             assert np.array_equal(other.best.z, one.best.z)
             assert np.array_equal(other.judged.covariance, one.judged.covariance)
+
+
+def test_what_is_found_is_said_before_a_full_disk_takes_the_files(tmp_path, monkeypatch):
+    (tmp_path / "fall.xml").write_text(deck(('body_id="2" pos_z="0.108"', 'body_id="2" pos_z="9"')))
+    rows = "".join(f"{t},{9.0 - 3.0 * t * t}\n" for t in np.arange(0.0, 1.01, 0.1))
+    (tmp_path / "z.csv").write_text("time,z\n" + rows)
+    (tmp_path / "fall.toml").write_text(
+        '[study]\nmodel = "fall.xml"\n[run]\nend_time = 1.0\n'
+        '[parameters]\ng = { path = "Force_Gravity.grav_z", low = -20, high = -1 }\n'
+        '[records.z]\nfile = "z.csv"\ncolumn = "z"\nsd = 0.01\nsignal = "bodies/2/position/z"\n'
+    )
+
+    def full(*_: object) -> None:
+        raise ResultsError("fall.json: results cannot be written: No space left on device")
+
+    monkeypatch.setattr("mbsim.results.files.replace_bytes", full)
+    monkeypatch.chdir(tmp_path)
+    found = CliRunner().invoke(main, ["identify", "fall.toml", "--workers", "1"])
+    assert found.exit_code == 5
+    assert "g = -6" in found.stdout
+    assert "No space left" in found.stderr

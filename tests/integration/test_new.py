@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from pathlib import Path
 
 import pytest
@@ -36,6 +38,21 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["friction.py"]
     (tmp_path / "file").write_text("")
     assert call("new", "stack", str(tmp_path / "file")).exit_code == 2
+
+
+def test_half_a_deck_is_not_left_on_a_full_disk(tmp_path: Path, monkeypatch) -> None:
+    whole = Path.open
+
+    def full(path: Path, *mode: str, **how: str):
+        if path.name == "friction.py":
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+        return whole(path, *mode, **how)
+
+    monkeypatch.setattr(Path, "open", full)
+    failed = call("new", "bowling", str(tmp_path))
+    assert failed.exit_code == 5
+    assert "friction.py: the deck cannot be written: No space left on device" in failed.stderr
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_mechanism_moves_as_its_comment_says(tmp_path: Path) -> None:
