@@ -183,8 +183,9 @@ def _check_inertia(inertia: Array, body: Body) -> None:
     if body.inertia is not None:
         names = ("xx", "yy", "zz", "xy", "yz", "xz")
         pairs = zip(names, body.inertia, strict=True)
-        given = " ".join(f"inertia_{name}={value:g}" for name, value in pairs if value) + ": "
-        given = given if given != ": " else "inertia_xx=0 inertia_yy=0 inertia_zz=0: "
+        # moments are told always, products where there are some
+        told = (f"inertia_{name}={value:g}" for name, value in pairs if value or name[0] == name[1])
+        given = " ".join(told) + ": "
     if not low > 0.0:
         raise BodyMassError(f"{given}{moments}; all must be > 0")
     raise BodyMassError(f"{given}{moments}; none may be larger than the sum of the others")

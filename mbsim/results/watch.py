@@ -59,7 +59,8 @@ class Watch:
         self.last = energy[-1].copy()
         each = wrenches.reshape(len(time), len(self.elements), 2, 3)
         # of a not finite force the rest is still worth telling
-        sizes = np.sqrt(each[..., 0] ** 2 + each[..., 1] ** 2 + each[..., 2] ** 2)
+        with np.errstate(all="ignore"):
+            sizes = np.sqrt(each[..., 0] ** 2 + each[..., 1] ** 2 + each[..., 2] ** 2)
         np.nan_to_num(sizes, copy=False, nan=-1.0)
         rows = sizes.argmax(axis=0)
         for kind in range(2):
