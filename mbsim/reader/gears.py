@@ -134,8 +134,7 @@ def _missing(draft: Draft, gear: GearDraft) -> str | None:
 CONSTRAINT_GEAR = Statement(
     "Constraint_Gear",
     {
-        "id": NAMED["id"],
-        "label": NAMED["label"],
+        **NAMED,
         "joint1_id": Spec(ID, "joint of the first body", required=True),
         "joint2_id": Spec(ID, "joint of the second body", required=True),
         "cv_marker_id": Spec(ID, "where they mesh, on the third body; along z", required=True),

@@ -326,6 +326,7 @@ _COMMON = {
     "id": NAMED["id"],
     "type": Spec(TEXT, _ABOUT_TYPE, required=True),
     "label": NAMED["label"],
+    "full_label": NAMED["full_label"],
     "color": Spec(TEXT, "colour in pictures, r:g:b, each from 0 to 255", "", "by its body"),
     "hidden": Spec(FLAG, "TRUE: pictures show it only when asked to", "", "FALSE"),
     "refinement_level": Spec(REAL, note="closed forms and meshes are used as they are"),

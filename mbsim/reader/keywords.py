@@ -22,7 +22,8 @@ def nearest(name: str, known: Iterable[str], likeness: float = 0.6) -> str:
     """Return ``; did you mean X?`` with the known name most like `name`, or an empty string.
 
     `likeness` is twice the letters that both have in order, over all letters of both, at least.
-    Where none is so like it, the first name that begins with it.
+    Where none is so like it, the first name that begins with it, that it begins with (expression
+    means expr), or else the only one whose last word it is (x means grav_x).
     """
     by_fold = {fold(word): word for word in known}
     word = fold(name)
@@ -31,6 +32,10 @@ def nearest(name: str, known: Iterable[str], likeness: float = 0.6) -> str:
     close.sort(key=lambda match: match[:1] != word[:1])
     if not close and len(word) > 1:
         close = [match for match in by_fold if match.startswith(word)]
+        close = close or [match for match in by_fold if len(match) > 3 and word.startswith(match)]
+    if not close:
+        ends = [key for key, whole in by_fold.items() if fold(whole.rpartition("_")[2]) == word]
+        close = ends if len(ends) == 1 else []
     return f"; did you mean {by_fold[close[0]]}?" if close else ""
 
 

@@ -75,6 +75,7 @@ POST_REQUEST = Statement(
         "id": NAMED["id"],
         "type": Spec(keyword(REQUEST_TYPES | BY_USERSUB), "what is written", required=True),
         "label": NAMED["label"],
+        "full_label": NAMED["full_label"],
         "comment": Spec(TEXT, "name in the CSV file, where there is no label"),
         "i_marker_id": Spec(ID, "marker I"),
         "j_marker_id": Spec(ID, "marker J", "", "global frame; of MARKER_FORCE: any"),

@@ -69,8 +69,13 @@ def filled(page: Page) -> str:
 
 
 def rows(head: Sequence[str], body: Iterable[Sequence[str]]) -> list[str]:
-    """Return a Markdown table; columns that are empty throughout are left out."""
+    """Return a Markdown table; columns that are empty throughout are left out.
+
+    Of no rows it is no lines.
+    """
     body = [list(row) for row in body]
+    if not body:
+        return []
     used = [k for k in range(len(head)) if any(row[k] for row in body)]
     lines = [[head[k] for k in used], ["---" for _ in used]]
     lines += [[row[k].replace("|", "\\|") for k in used] for row in body]

@@ -61,7 +61,7 @@ def attributes(name: str, page: Page) -> list[str]:
     notes = [_choices(n, spec) for n, spec in read.items() if _type(spec.kind).endswith("below")]
     notes += _grouped(known, "note", "Accepted, without effect")
     notes += _grouped(known, "refused", "Refused")
-    if notes:
+    if notes and lines:
         lines.append("")
     for text in notes:
         lines += item(text)

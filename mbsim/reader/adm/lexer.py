@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from mbsim.reader.adm.declare import AdmStatement, Value
-from mbsim.reader.keywords import fold
+from mbsim.reader.keywords import fold, nearest
 from mbsim.reader.parse import Attribute, Node
 
 LONGEST = 100_000  # characters of one statement
@@ -183,7 +183,8 @@ class _Arguments:
         else:
             shown = piece if len(piece) <= 60 else piece[:57] + "..."
             known = ", ".join(words or self.statement.words) or "none"
-            what = f"may be {known}; write more of it" if words else f"unknown word; known: {known}"
+            close = nearest(piece, self.statement.words) or f"; known: {known}"
+            what = f"may be {known}; write more of it" if words else f"unknown word{close}"
             self.fault(self.raw.line(start), self.label, f"{shown}: {what}")
 
     def _is_word(self, piece: str, word: str) -> bool:
