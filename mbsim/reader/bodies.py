@@ -40,7 +40,7 @@ def _build_units(entry: Entry) -> None:
     entry.draft.units = units.make_units(**chosen, mass_mult_factor=factor)
 
 
-def _velocity(entry: Entry, kind: str) -> tuple[float, float, float]:
+def start_velocity(entry: Entry, kind: str) -> tuple[float, float, float]:
     """Return the initial velocity; a value whose flag is not TRUE counts as zero."""
     parts = []
     for name, flag in _COMPONENTS[kind]:
@@ -54,14 +54,10 @@ def _velocity(entry: Entry, kind: str) -> tuple[float, float, float]:
     return (parts[0], parts[1], parts[2])
 
 
-def _given(entry: Entry, kind: str) -> tuple[bool, bool, bool]:
-    """Return which components of the initial velocity the deck gives."""
-    x, y, z = _COMPONENTS[kind]
-    return _holds(entry, *x), _holds(entry, *y), _holds(entry, *z)
-
-
-def _holds(entry: Entry, name: str, flag: str) -> bool:
-    return entry.given(name) and bool(entry.get(flag, False))
+def start_given(entry: Entry, kind: str) -> tuple[bool, bool, bool]:
+    """Return which components of the initial velocity count: a flag without a value gives 0."""
+    x, y, z = (bool(entry.get(flag, False)) for _, flag in _COMPONENTS[kind])
+    return x, y, z
 
 
 def _inertia(entry: Entry) -> tuple[float, float, float, float, float, float] | None:
@@ -86,10 +82,10 @@ def _build_body(entry: Entry) -> None:
         cg_id=entry.get("cg_id"),
         im_id=entry.get("im_id"),
         lprf_id=entry.get("lprf_id"),
-        v_ic=_velocity(entry, "v"),
-        w_ic=_velocity(entry, "w"),
-        v_given=_given(entry, "v"),
-        w_given=_given(entry, "w"),
+        v_ic=start_velocity(entry, "v"),
+        w_ic=start_velocity(entry, "w"),
+        v_given=start_given(entry, "v"),
+        w_given=start_given(entry, "w"),
         vm_id=entry.get("vm_id"),
         wm_id=entry.get("wm_id"),
         density=entry.get("density"),
@@ -194,8 +190,7 @@ PARAM_UNIT = Statement(
 BODY_RIGID = Statement(
     "Body_Rigid",
     {
-        "id": NAMED["id"],
-        "label": NAMED["label"],
+        **NAMED,
         "isground": Spec(FLAG, "TRUE: the body that does not move", "", "FALSE"),
         "cg_id": Spec(
             ID, "marker of the body at its centre of mass", "", "with density, that of its graphics"
@@ -241,8 +236,7 @@ _NOT_BUILT = "is documented but not built yet"
 REFERENCE_MARKER = Statement(
     "Reference_Marker",
     {
-        "id": NAMED["id"],
-        "label": NAMED["label"],
+        **NAMED,
         "body_id": Spec(ID, "body that carries the marker", required=True),
         "body_type": Spec(
             keyword(spellings(RIGIDBODY="", POINTBODY=""), spellings(FLEXBODY="")),

@@ -108,11 +108,8 @@ def _times(entry: Entry) -> tuple[float, float] | None:
 def _build_timeless(entry: Entry) -> None:
     """Add an assembly, an equilibrium or a linear analysis, which take no time."""
     draft, kind = entry.draft, entry.get("analysis_type")
-    if kind == "ASSEMBLY":
-        unused: tuple[str, ...] = ("start_time", "end_time", "duration", *_OUTPUTS)
-    else:
-        unused = ("end_time", *_OUTPUTS)
-    for name in (*unused, "print_increment"):
+    unused = ("end_time", "duration", *_OUTPUTS, "print_increment")
+    for name in ("start_time", *unused) if kind == "ASSEMBLY" else unused:
         if entry.given(name):
             entry.note(f"has no effect with analysis_type {kind}, which takes no time", name)
     now = draft.simulations[-1].end_time if draft.simulations else 0.0
@@ -296,6 +293,7 @@ FORCE_GRAVITY = Statement(
     {
         "id": Spec(ID, "number by which others name it", "", "1"),
         "label": NAMED["label"],
+        "full_label": NAMED["full_label"],
         **{
             f"grav_{axis}": Spec(REAL_OR_EXPRESSION, f"gravity along global {axis}", "L/T^2", "0")
             for axis in "xyz"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mbsim.model import elements as el
+from mbsim.reader.bodies import start_given, start_velocity
 from mbsim.reader.draft import Draft
 from mbsim.reader.kinds import FLAG, ID, POSITIVE, REAL
 from mbsim.reader.statement import NAMED, Entry, Spec, Statement
@@ -13,8 +14,6 @@ INERTIA = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
 
 def _build_point(entry: Entry) -> None:
     """Add a point mass."""
-    x, y, z = (entry.get(f"v_ic_{axis}", 0.0) for axis in "xyz")
-    given = [bool(entry.get(f"v_ic_{axis}_flag", False)) for axis in "xyz"]
     body = el.Body(
         id=entry.get("id", 0),
         label=entry.get("label", ""),
@@ -22,8 +21,8 @@ def _build_point(entry: Entry) -> None:
         inertia=INERTIA,
         cg_id=entry.get("cg_id"),
         lprf_id=entry.get("lprf_id"),
-        v_ic=(x, y, z),
-        v_given=(given[0], given[1], given[2]),
+        v_ic=start_velocity(entry, "v"),
+        v_given=start_given(entry, "v"),
         source=entry.source,
     )
     entry.draft.points[body.id] = ("Body_Point", entry.source)
@@ -58,8 +57,7 @@ def hold_points(draft: Draft) -> None:
 BODY_POINT = Statement(
     "Body_Point",
     {
-        "id": NAMED["id"],
-        "label": NAMED["label"],
+        **NAMED,
         "cg_id": Spec(ID, "marker of the body where its mass is", required=True),
         "lprf_id": Spec(ID, "marker in which the body's markers are given", "", "global frame"),
         "mass": Spec(POSITIVE, "mass", "M", required=True),

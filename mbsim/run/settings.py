@@ -184,7 +184,7 @@ def _tolerance(model: Model, simulation: Simulation, tol: float | None) -> tuple
         try:
             return _checked("tol", chosen, 1e-15, 0.1), said
         except ModelError as error:
-            raise ModelError(f"{where}: Param_Transient: {name}: {error}") from None
+            raise ModelError(f"{where}: Param_Transient: {name}: {error}; {said}") from None
     return DEFAULT_TOL_ADAMS if adams else DEFAULT_TOL, "the default"
 
 
@@ -328,6 +328,7 @@ def settle(
     notes = []
     stages = []
     asked: dict[str, str] = {}
+    awake = False
     motionsolve = model.compatibility.upper().replace("_", "") == "MOTIONSOLVE"
     for simulation in _simulations(model, end_time, print_interval):
         sources = (simulation.transient, model.transient)
@@ -338,6 +339,7 @@ def settle(
 
         method, where = _asked_method(model, sources, integrator)
         asked.setdefault(method, where)
+        awake |= said("sleep") is False
         chosen, who = _tolerance(model, simulation, tol)
         h_max = said("h_max") or math.inf
         if motionsolve:
@@ -362,6 +364,8 @@ def settle(
             )
     method, said_of_friction = _for_rigid_friction(model, method)
     notes += said_of_friction
+    if awake and method != RIGID:
+        notes.append(f"Param_Transient sleep: is for MOREAU; nothing sleeps with {method}")
     settings = Settings(tuple(stages), method, (*notes, *said_of_names))
     return replace(settings, notes=(*settings.notes, f"tol {settings.tolerances}"))
 
