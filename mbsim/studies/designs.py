@@ -13,13 +13,11 @@ import numpy as np
 
 from mbsim.errors import ModelError
 from mbsim.studies.csv_file import read_csv
-from mbsim.studies.distributions import Numbers, Spread
+from mbsim.studies.distributions import MOST_RUNS, Numbers, Spread
 
 if TYPE_CHECKING:
     from mbsim.studies.study import Study
 
-#: Most runs of a study: more is a mistyped number.
-MOST_RUNS = 10_000_000
 #: Fewest blocks of a Saltelli design: intervals are resamplings of them.
 FEWEST_BLOCKS = 16
 

@@ -12,6 +12,8 @@ from mbsim.errors import ModelError
 
 Numbers = np.ndarray[Any, np.dtype[np.float64]]
 
+#: Most runs of a study: more is a mistyped number.
+MOST_RUNS = 10_000_000
 #: Keys that each kind of parameter needs, and those that it may have.
 _KINDS: dict[str, tuple[frozenset[str], frozenset[str]]] = {
     "values": (frozenset({"values"}), frozenset()),
@@ -112,8 +114,8 @@ def read_spread(table: dict[str, Any], needed_here: bool = True) -> Spread:
     if scale not in ("linear", "log"):
         raise ModelError(f'scale = {scale!r}: must be "linear" or "log"')
     count = given.pop("count", 0)
-    if type(count) is not int or count < 0:
-        raise ModelError(f"count = {count!r}: must be a whole number from 1 on")
+    if type(count) is not int or not 0 <= count <= MOST_RUNS:
+        raise ModelError(f"count = {count!r}: must be a whole number from 1 to {MOST_RUNS}")
     numbers = dict(zip(given, _numbers(list(given.values())), strict=True))
     _check_numbers(kind, numbers, scale == "log")
     return Spread(kind, numbers, (), scale == "log", count)

@@ -16,7 +16,7 @@ from mbsim import __version__
 from mbsim.errors import ModelError
 from mbsim.reader.written import written
 from mbsim.studies.designs import DESIGNS, SAMPLED
-from mbsim.studies.distributions import Numbers, Spread, read_spread
+from mbsim.studies.distributions import MOST_RUNS, Numbers, Spread, read_spread
 from mbsim.studies.formulas import Formula
 from mbsim.studies.outputs import Output, read_output
 
@@ -231,6 +231,8 @@ def _about(
     for name, value in (("runs", runs), ("seed", seed)):
         if type(value) is not int or value < 0:
             faults.append(f"study.{name} = {value!r}: must be a whole number from 0 on")
+    if type(runs) is int and runs > MOST_RUNS:
+        faults.append(f"study.runs = {runs}: at most {MOST_RUNS} are taken")
     counted = design in SAMPLED
     if counted and runs == 0:
         faults.append(f"study.runs: {design} needs their number")

@@ -126,3 +126,18 @@ def test_a_place_within_a_message_is_not_its_beginning():
     line = "4 runs failed: DeckError: models/a.xml:11: Body_Rigid[2]: mass"
     assert with_severity("warning", line) == f"mbsim: warning: {line}"
     assert with_severity("error", "C:\\a b.xml:3: no") == "C:\\a b.xml:3: error: no"
+
+
+@pytest.mark.parametrize("design", ["latin_hypercube", "sobol", "random", "saltelli"])
+def test_more_runs_than_anybody_means_are_refused_at_once(tmp_path, design):
+    text = SWEEP.replace('csv = "c.csv"', f'design = "{design}"\nruns = 1000000000')
+    text = text.replace('damping" }', 'damping", low = 1, high = 2 }')
+    with pytest.raises(ModelError, match="runs = 1000000000: at most 10000000 are taken"):
+        read_study(written(tmp_path, text))
+
+
+def test_more_levels_than_anybody_means_are_refused_at_once(tmp_path):
+    text = SWEEP.replace('csv = "c.csv"', 'design = "grid"')
+    text = text.replace('damping" }', 'damping", low = 1, high = 2, count = 1000000000 }')
+    with pytest.raises(ModelError, match="count = 1000000000: must be a whole number from 1 to"):
+        read_study(written(tmp_path, text))
