@@ -215,7 +215,7 @@ def described(study: Study) -> tuple[str, Mapping[str, float]]:
     from mbsim.results.identity import Identity
 
     try:
-        system, _ = checked_system(study, _first_changes(study))
+        system, settings = checked_system(study, _first_changes(study))
     except ModelError as error:
         lines = str(error).split("\n")
         if isinstance(error, DeckError) or not any(line.startswith("--set ") for line in lines):
@@ -223,6 +223,7 @@ def described(study: Study) -> tuple[str, Mapping[str, float]]:
         said = (f"{study.file}: {by_key(study, line)}" for line in lines)
         raise ModelError("\n".join(said)) from None
     faults = [*check_signals(study, system, "outputs:"), *_vectors(study, system), *_peaks(study)]
+    faults += _out_of_time(study, settings)
     if faults:
         raise ModelError("\n".join(f"{study.file}: {line}" for line in faults))
     facts: dict[str, Any] = Identity(system).facts
@@ -232,6 +233,18 @@ def described(study: Study) -> tuple[str, Mapping[str, float]]:
     about = [system.model.sha256, others, facts["subroutines"]]
     text = json.dumps(about, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest(), output_sizes(study, system)
+
+
+def _out_of_time(study: Study, settings: Settings) -> Iterator[str]:
+    """Yield outputs at times that no run comes to; where runs end differently, none is told."""
+    from mbsim.reader.keywords import fold
+
+    if any(fold(path).startswith("simulate") for path in study.paths):
+        return
+    start, end = settings.stages[0].simulation.start_time, settings.end_time
+    for output in study.outputs:
+        if output.reduce == "at" and not start <= output.at <= end * (1.0 + 1e-12):
+            yield f"outputs.{output.name}: at = {output.at:g}: runs go from {start:g} to {end:g}"
 
 
 def checked_system(study: Study, changes: Mapping[str, str]) -> tuple[System, Settings]:

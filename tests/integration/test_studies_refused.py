@@ -141,3 +141,14 @@ def test_more_levels_than_anybody_means_are_refused_at_once(tmp_path):
     text = text.replace('damping" }', 'damping", low = 1, high = 2, count = 1000000000 }')
     with pytest.raises(ModelError, match="count = 1000000000: must be a whole number from 1 to"):
         read_study(written(tmp_path, text))
+
+
+@pytest.mark.parametrize("at", ["0.5", "-0.1"])
+def test_an_output_at_a_time_that_no_run_comes_to_is_refused(tmp_path, at):
+    text = SWEEP.replace('contacts/301/peak_force"', f'bodies/2/position/z", at = {at}')
+    study = read_study(written(tmp_path, text, c="c\n1\n"))
+    with pytest.raises(ModelError, match=f"outputs.x: at = {at}: runs go from 0 to 0.4$"):
+        described(study)
+    by_parameter = text.replace("Force_Contact[301].damping", "Simulate.end_time")
+    by_parameter = by_parameter.replace("[run]\nend_time = 0.4\n", "")
+    described(read_study(written(tmp_path, by_parameter, c="c\n1\n")))
