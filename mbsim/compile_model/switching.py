@@ -7,10 +7,10 @@ differs where a branch does:
 | function            | switches                                                              |
 |---------------------|-----------------------------------------------------------------------|
 | ABS(x), IF(x: ..)   | x                                                                     |
-| SIGN(a, b)          | a, b                                                                  |
+| SIGN(a, b)          | a; b, where 0 is on the side of what is above                         |
 | DIM, MIN, MAX       | a - b, one argument after the other                                   |
-| MOD(a, b)           | sin(pi a / b), 0 wherever a / b is whole                              |
-| AINT(x), ANINT(x)   | sin(pi x), cos(pi x)                                                  |
+| MOD(a, b)           | whether AINT(a / b) is odd                                            |
+| AINT(x), ANINT(x)   | whether they are odd                                                  |
 | STEP, STEP5, HAVSIN | x - x0, x - x1                                                        |
 | SWEEP               | the same, and x - x0 - dx                                             |
 | ATAN2, PSI, PHI, YAW, ROLL | themselves where they are more than pi/2 off 0: from pi to -pi  |
@@ -55,6 +55,14 @@ def _call(name: str, *args: Node) -> Call:
     return Call(name, args)
 
 
+def _odd(whole: Node) -> Node:
+    """Return what is above 0 where a whole number is odd.
+
+    As it is rounded: a step that ends behind a jump of time is on its side then.
+    """
+    return _call("ABS", _call("MOD", whole, Number(2.0)))
+
+
 def _stop(depth: Node, rate: Node, law: tuple[Node, ...]) -> Iterator[Node]:
     """Yield the switches of a stop."""
     k, e, c, dmax = law
@@ -73,16 +81,17 @@ def _of_call(node: Call) -> Iterator[Node]:
     if name in ("ABS", "IF"):
         yield x[0]
     elif name == "SIGN":
-        yield from x
+        yield x[0]
+        yield _call("IF", x[1], Number(-1.0), Number(1.0), Number(1.0))
     elif name in ("DIM", "MIN", "MAX"):
         best = x[0]
         for other in x[1:]:
             yield _call("SUB", best, other)
             best = _call(name, best, other)
     elif name == "MOD":
-        yield _call("SIN", _call("MUL", Number(math.pi), _call("DIV", *x)))
+        yield _odd(_call("AINT", _call("DIV", *x)))
     elif name in ("AINT", "ANINT"):
-        yield _call("SIN" if name == "AINT" else "COS", _call("MUL", Number(math.pi), x[0]))
+        yield _odd(node)
     elif name in _ANGLES:
         behind = _call("SUB", _call("ABS", node), Number(0.5 * math.pi))
         yield _call("IF", behind, Number(-1.0), node, node)

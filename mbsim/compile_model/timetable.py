@@ -282,13 +282,13 @@ class Timetable:
         jumps = jumps[np.argsort(jumps[:, 0])]
         stops: list[list[float]] = []
         for a_jump, behind in jumps:
-            # a stage at the end of a step may round to behind it
+            # a stage at the end of a step may round to behind it; sines of a run round otherwise
             least = float(_least(behind, end))
-            before = float(a_jump) - 0.5 * least
+            before, behind = float(a_jump) - 0.5 * least, float(behind) + 0.5 * least
             if stops and before <= stops[-1][1] + least:
-                stops[-1][1] = float(behind)
+                stops[-1][1] = behind
             else:
-                stops.append([before, float(behind)])
+                stops.append([before, behind])
         ends, reaches = [], []
         for c in cells:
             lo, w = c.lo[~c.jump], c.w[~c.jump]

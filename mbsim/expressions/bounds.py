@@ -189,9 +189,19 @@ def over(u: Bound, v: Bound) -> Bound:
     steady = np.all((v.value.lo == v.value.hi) & (v.slope.lo == 0.0) & (v.slope.hi == 0.0))
     if steady and np.all(v.value.lo != 0.0):
         c = 1.0 / v.value.lo
-        value, slope, bend = (scaled_range(part, c) for part in u[:3])
+        slope, bend = (scaled_range(part, c) for part in u[1:3])
+        value = _quotient(u.value, v.value)
         return Bound(value, slope, bend, np.minimum(u.level, v.level))
-    return times(u, _inverse(v))
+    found = times(u, _inverse(v))
+    clear = (v.value.lo > 0.0) | (v.value.hi < 0.0)
+    with np.errstate(all="ignore"):
+        return found._replace(value=where_range(clear, _quotient(u.value, v.value), found.value))
+
+
+def _quotient(u: Range, v: Range) -> Range:
+    """Return u / v where v is not 0 anywhere, rounded as a run rounds it: AINT of it may jump."""
+    corners = [_known(a / b) for a in u for b in v]
+    return Range(np.minimum.reduce(corners), np.maximum.reduce(corners))
 
 
 def rising(f: Callable[[Array], Array], u: Range) -> Range:

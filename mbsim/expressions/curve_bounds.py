@@ -69,7 +69,9 @@ class Curve:
         first = np.searchsorted(self.knots, lo, "right")
         last = np.searchsorted(self.knots, hi, "left")
         last = np.maximum(last, np.minimum(first, last + 1))
-        first = np.minimum(first, last)
+        # a span that begins or ends at a knot has it, or neither of its neighbours may
+        first = np.where(lo < hi, np.searchsorted(self.knots, lo, "left"), np.minimum(first, last))
+        last = np.where(lo < hi, np.searchsorted(self.knots, hi, "right"), last)
         right = np.where(first == last, hi, self.knots[np.minimum(first, len(self.knots) - 1)])
         left = np.where(first == last, lo, self.begin[last])
         parts = []

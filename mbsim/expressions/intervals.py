@@ -146,7 +146,8 @@ def absolute(u: Bound) -> Bound:
     v = u.value
     size = Range(np.zeros_like(v.lo + v.hi), np.maximum(-v.lo, v.hi))
     bent = either(u, negative(u), 1)._replace(value=size)
-    return where(v.lo >= 0.0, u, where(v.hi <= 0.0, negative(u), bent))
+    # one that begins or ends where slopes jump has them jump: its neighbour may not
+    return where(v.lo > 0.0, u, where(v.hi < 0.0, negative(u), bent))
 
 
 def _steps(u: Bound, rounded: Callable[[Array], Array]) -> Bound:
@@ -182,7 +183,7 @@ def largest(u: Bound, v: Bound) -> Bound:
     """Return the larger of two."""
     both = either(u, v, 1)
     both = both._replace(value=Range(np.maximum(u.value.lo, v.value.lo), both.value.hi))
-    return where(u.value.lo >= v.value.hi, u, where(v.value.lo > u.value.hi, v, both))
+    return where(u.value.lo > v.value.hi, u, where(v.value.lo > u.value.hi, v, both))
 
 
 def _maximum(parts: Sequence[Bound]) -> Bound:
@@ -235,14 +236,13 @@ def _blend(parts: Sequence[Bound], kind: str) -> Bound:
         )
     first = where_range(out, either_range(first, ZERO), first)
     second = where_range(out, either_range(second, ZERO), second)
-    edge = out & (high > low)
+    edge = out & (s.value.hi >= 0.0) & (s.value.lo <= 1.0)
     level = np.where(edge, SMOOTH if kind == "STEP5" else 2, SMOOTH)
     part = chain(s, value, first, second, level)
     found = add(h0, times(sub(h1, h0), part))
     # one without width jumps
     width = minus_range(x1.value, x0.value)
-    before, behind = x.value.hi <= x0.value.lo, x.value.lo >= x1.value.hi
-    behind &= x.value.lo > x0.value.hi
+    before, behind = x.value.hi < x0.value.lo, x.value.lo > x1.value.hi
     found = where(width.lo > 0.0, found, either(h0, h1, 0))
     return where(before, h0, where(behind, h1, found))
 
