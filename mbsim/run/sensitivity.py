@@ -106,7 +106,7 @@ def attach(runner: Runner, found: Sequence[Direction], worth: int) -> None:
 
     tol = runner.settings.stages[0].tol
     y, problem = runner.method.y, runner.problem
-    made = Sensitivities(runner.system, found, y, assemble, problem, tol, worth)
+    made = Sensitivities(runner.system, found, y, assemble, problem, tol, worth, start)
     runner.methods.follow(made)
     runner.sensitivities = made
     runner.problem = runner.methods.problem

@@ -46,7 +46,9 @@ RUN_TANGENT, OWN_TANGENT, LINEARISED = range(30, 33)
 COLLIDES = 33
 # whether a force by an expression jumps at the end of the step that is taken
 JUMPS = 34
-WORDS = 35
+# whether something follows time, so that it may jump
+TIMED = 35
+WORDS = 36
 #: Rows of `Variations.far` and `depth`: either side of a difference, and the run itself.
 UP_SIDE, DOWN_SIDE, OWN = range(3)
 #: Rows of `Variations.jump`: y before the commit, f before and behind it; y and f of the straight
@@ -63,6 +65,9 @@ APART = 1
 LAST_UNTIL, LAST_ON = range(2)
 #: Numbers of a row of `Variations.shown`: part of the last step, `later` there.
 SHOWN_AT, SHOWN_LATER = range(2)
+#: Of `Variations.gap` and `moves`: the jump at the begin and at the end of the last step; when that
+#: has ended.
+FIRST, LAST, UNTIL = range(3)
 #: Of `Variations.times`: how much later it is where a parameter is larger and smaller, by how much.
 UP_TO, DOWN_TO, BY = range(3)
 #: Number of `Variations.enough`: what an iteration may leave, over the derivative.
@@ -159,6 +164,15 @@ class Variations(NamedTuple):
     place: tags.Constant[I1]  # where each of these is
     base: tags.Constant[F1]  # what it is
     rise: tags.Constant[F1]  # its derivative
+    # (3,) times at which something jumps, NaN for none, see FIRST; (P, 2) how far a parameter moves
+    # them, at most, over its change, 0 where it does not; (P, n) how derivatives jump there
+    gap: F1
+    moves: F2
+    fall: tags.Scratch[F2]
+    # (P,) part of usual steps of differences that the last step takes next to a jump; 1 where it is
+    shrink: F1
+    close: I1
+    sides: tags.Scratch[F2]  # (SIDES, n) of `timed`
     step: tags.Scratch[F2]  # (rows, P) by how much a parameter is changed for a row of results
 
 

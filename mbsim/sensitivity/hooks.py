@@ -40,6 +40,7 @@ from mbsim.sensitivity.arrays import (
     COMMIT,
     DOWN_SIDE,
     F_BEFORE,
+    FIRST,
     FITTED,
     FOLLOWED,
     JOINTS,
@@ -65,6 +66,7 @@ from mbsim.sensitivity.arrays import (
     SHOWN_LATER,
     STEADY,
     STRAIGHT,
+    TIMED,
     TWIN,
     UP,
     WORTH,
@@ -85,6 +87,7 @@ from mbsim.sensitivity.generalised import generalised_step, note_along
 from mbsim.sensitivity.implicit import implicit_step
 from mbsim.sensitivity.later import UNKNOWN, add, add_motion, give_up, go_on, is_steady, pays
 from mbsim.sensitivity.reintegration import hold, make_sure
+from mbsim.sensitivity.timed import begin_unseen, clear_time, look_behind, make_room
 from mbsim.sensitivity.twin import half_step, is_deep, keep_unit, one_side, reach_of, set_parameter
 
 #: Where the packed `Variations` stand: where those of MOREAU would, which takes no part in this.
@@ -110,6 +113,17 @@ def lose(V: Variations, k: int, t: float, why: int) -> None:
         tables[k, :, :] = 0.0
     V.bends[k] = 0
     V.later[k, :] = 0.0
+
+
+@jitable
+def lose_behind(V: Variations, k: int, t: float, why: int) -> None:
+    """Know derivative k no more from the end of a step on, at time t: rows within it are known."""
+    if V.lost[k] == math.inf:
+        V.lost[k] = t
+        V.why[k] = why
+    V.d[k, :] = 0.0
+    for tables in (V.memory, V.before, V.end):
+        tables[k, :, :] = 0.0
 
 
 @jitable
@@ -145,6 +159,10 @@ def fit_hermite(V: Variations, m: Method, h: float) -> None:
 @jitable
 def own_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
     """Fill derivative k at the end of the step as the run's method has it; return a code."""
+    if V.close[k] == 1:
+        # next to a jump of time: along the motion all that is evaluated keeps clear of it
+        V.error[k] = math.inf
+        return 0
     if V.words[ATTEMPT] != 0:
         if V.words[CHANGES] > 0 or (V.bent[k] >= OFTEN and V.bent[k] % NOW_AND_THEN != 0):
             V.error[k] = math.inf
@@ -180,7 +198,8 @@ def bent_step(
     e = half_step(V, k)
     goes_on, later, V.parts[k] = V.words[ALONG] == 1, V.later[k, LAST_UNTIL], 0
     code, V.later[k, LAST_ON] = step_along(V, scene, t, h, k, (0.0, 1.0), goes_on, later)
-    if code == 0 and V.words[JOINTS] == 1:
+    if code == 0 and V.words[JOINTS] == 1 and V.close[k] == 0:
+        # next to a jump sides would be put where motions have them at another time
         code = project_end(V, scene, m, t + h, k, e)
     if V.words[ALONG] == 1 and not changes:
         note_along(V, h, k)
@@ -206,6 +225,7 @@ def carry(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) ->
     for i in range(len(d)):
         V.own[i] = d[i]
     add(d, m.k[0], later)
+    make_room(V, k, t, h)
     deep = V.words[ATTEMPT] != 0 and is_deep(V, k)
     e = half_step(V, k) if deep else one_side(V, m, k)
     code = own_step(V, scene, m, t, h, k)
@@ -248,6 +268,7 @@ def take_step(V: Variations, scene: Scene, m: Method, t: float, h: float) -> Non
     V.words[FITTED] = 1 if m.memory[SHOWN] == 1.0 or V.words[ATTEMPT] == 0 else 0
     for k in range(len(V.size)):
         if V.lost[k] < math.inf:
+            lose(V, k, t, V.why[k])
             continue
         if is_too_much(V):
             lose(V, k, t, LOST_WORK)
@@ -267,6 +288,8 @@ def rhs_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """F of the twin, and which slots touch there."""
     twin = view(context, Scene)
     V = view(twin.world.hooks[AT], Variations)
+    if V.words[TIMED] == 1:
+        t = clear_time(V, t)
     code = call_int(V.words[RHS], (context, t, h, a, b))
     V.words[ASKED] += 1
     hit, last = twin.work.hit, len(twin.work.hit) - 1
@@ -293,6 +316,8 @@ def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int
     V.line[0] = SPAN * m.memory[OWN_TIME]
     V.shift[:] = math.nan
     list_asking(V, scene, switched)
+    V.reason[:] = 0.0
+    hops = V.words[TIMED] == 1 and look_for_jumps(V, scene, m, t)
     take_step(V, scene, m, t - h, h)
     make_sure(V, scene, m, t, switched)
     for k in range(len(V.size)):
@@ -301,13 +326,8 @@ def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int
         note_changes(V, scene, t)
     word = call_int(V.words[COMMIT], (context, t, h, a, b))
     if word >= 0 and (switched or word & (Taken.Y_CHANGED + Taken.BEGIN_ANEW)):
-        for k in range(len(V.size)):
-            V.reason[k] = 0.0
         cross(V, scene, t, y, switched)
-        for k in range(len(V.size)):
-            if V.reason[k] != 0.0:
-                lose(V, k, t, int(V.reason[k]))
-    anew = word & (Taken.Y_CHANGED + Taken.BEGIN_ANEW) != 0
+    anew = hops or word & (Taken.Y_CHANGED + Taken.BEGIN_ANEW) != 0
     for k in range(len(V.size)):
         if switched or anew:
             V.smooth[k] = V.ready[k] = 0
@@ -318,10 +338,27 @@ def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int
         for i in range(n):
             V.kept[k, i] = V.d[k, i]
             V.d[k, i] = V.next[k, i]
+            if hops:
+                V.d[k, i] += V.fall[k, i]
             if not abs(V.d[k, i]) * V.size[k] <= LARGEST * V.scale[i]:
-                lose(V, k, t, LOST_LARGE)
+                V.reason[k] = LOST_LARGE
+        if hops and not math.isfinite(V.fall[k, 0]):
+            V.reason[k] = LOST_JUMP
+        if V.reason[k] != 0.0:
+            lose_behind(V, k, t, int(V.reason[k]))
     hold(V, scene, t, y, switched or anew or V.words[CHANGES] > 0)
     return word
+
+
+@jitable
+def look_for_jumps(V: Variations, scene: Scene, m: Method, t: float) -> bool:
+    """Find what jumps by time at both ends of a step; return whether something does at its end."""
+    if begin_unseen(V, scene, m, t):
+        # as at the begin of a run: where it jumps later only one side of a parameter does so at all
+        for k in range(len(V.size)):
+            if V.moves[k, FIRST] > 0.0 or not math.isfinite(V.fall[k, 0]):
+                lose(V, k, m.memory[TIME], LOST_JUMP)
+    return look_behind(V, scene, m, t)
 
 
 @jitable
@@ -408,8 +445,9 @@ def write_beside(
         set_parameter(V, twin, scene, k, sign * e)
         for i in range(n):
             x[i] = at[i] + sign * e * w[i]
-        code = call_int(p.project, (p.context, t, 0.0, x, x))
-        answer = call_int(V.words[OUTPUT], (p.context, t, h, x, V.row[2]))
+        clear = clear_time(V, t)
+        code = call_int(p.project, (p.context, clear, 0.0, x, x))
+        answer = call_int(V.words[OUTPUT], (p.context, clear, h, x, V.row[2]))
         if code != 0 or answer < 0:
             lose(V, k, t, LOST_FAILED)
             # the row is there all the same, so that rows are told by their number

@@ -26,6 +26,7 @@ from mbsim.sensitivity.hooks import AT, commit_hook, output_hook, rhs_hook
 from mbsim.sensitivity.implicit import STAGES
 from mbsim.sensitivity.parameters import SURFACE, Direction, replaced, weighed
 from mbsim.sensitivity.reintegration import MOTIONS
+from mbsim.sensitivity.timed import SIDES
 from mbsim.sensitivity.twin import STEP, STEP_OF_CONTACTS
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ LEFT, LEFT_OF_CONTACTS, LEFT_OF_MEMORY = 0.3, 0.05, 1e-10
 ONE_SIDED, ONE_SIDED_IN_IMPACTS = (3.0, 1.0, 1.0), (1.0, 0.1, 0.3)
 ONE_SIDED_OFTEN, ONE_SIDED_OFTEN_IN_IMPACTS = (0.1, 0.1, 1.0), (1.0, 0.1, 0.1)
 #: What is one whole number of each parameter.
-_FLAGS = ("stale", "bend_known", "ready", "bends", "bent")
+_FLAGS = ("stale", "bend_known", "ready", "bends", "bent", "close")
 #: What is no signal of the motion.
 _NO_SIGNALS = ("time", "state/", "contact_points/", "events")
 _WHY = {
@@ -104,6 +105,8 @@ class Sensitivities:
         Of the run.
     worth : int
         A derivative ends where it has taken so many times the run's own evaluations, 0: nowhere.
+    start : float
+        Time at which the run begins.
     """
 
     def __init__(
@@ -115,7 +118,10 @@ class Sensitivities:
         problem: Problem,
         tol: float,
         worth: int = 0,
+        start: float = 0.0,
     ) -> None:
+        from mbsim.compile_model.timetable import follows_time
+
         self.system, self.directions, self._tol = system, list(directions), tol
         self.twin = twin_of(system, directions)
         self._table = pack(self.twin.scene)
@@ -125,6 +131,8 @@ class Sensitivities:
         starts = [self._start(direction, assemble, own) for direction in self.directions]
         self.arrays = self._arrays(y, np.array(starts), tol)
         self.arrays.words[at.WORTH] = worth
+        self.arrays.words[at.TIMED] = int(follows_time(system.scene))
+        self.arrays.gap[at.LAST], self.arrays.gap[at.UNTIL] = -math.inf, start
         self._pack()
         self._alive: Any = None
         self._mark: Any = None
@@ -182,7 +190,6 @@ class Sensitivities:
             rate=np.full(count, 0.99),
             carried=np.zeros((count, 4, n)),
             bend=np.zeros((count, n)),
-            **{name: np.zeros(count, dtype=np.int64) for name in _FLAGS},
             jump=np.zeros((5, n)),
             end=np.zeros((count, *shape)),
             middle=np.zeros((count, *shape)),
@@ -226,6 +233,7 @@ class Sensitivities:
             place=np.array(place, dtype=np.int64),
             base=np.array(base),
             rise=np.array(slope),
+            **_of_jumps(count, n),
             step=np.zeros((rows, count)),
         )
 
@@ -369,6 +377,17 @@ class Sensitivities:
             )
             if lost < math.inf
         ]
+
+
+def _of_jumps(count: int, n: int) -> dict[str, Any]:
+    """Return the arrays of `timed`, for so many parameters and numbers of y, and `_FLAGS`."""
+    return {name: np.zeros(count, dtype=np.int64) for name in _FLAGS} | {
+        "gap": np.full(3, math.nan),
+        "moves": np.zeros((count, 2)),
+        "shrink": np.ones(count),
+        "fall": np.zeros((count, n)),
+        "sides": np.zeros((SIDES, n)),
+    }
 
 
 def _collides(system: System) -> bool:

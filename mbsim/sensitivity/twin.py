@@ -28,7 +28,7 @@ STEP_OF_CONTACTS, PART_OF_DEPTH = 1e-9, 1e-6
 @jitable
 def half_step(V: Variations, k: int) -> float:
     """Return by how much parameter k is changed to either side."""
-    return part_of_step(V, k, 1.0, 1.0, 1.0)
+    return V.shrink[k] * part_of_step(V, k, 1.0, 1.0, 1.0)
 
 
 @jitable
