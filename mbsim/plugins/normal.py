@@ -143,17 +143,19 @@ def _callback(made: UserNormal) -> tuple[int, object]:
     from mbsim.core.codes import Code
 
     out_at, inputs = guard.Views(3), made.inputs.data
+    own = len(made.hidden)
+    par_at = guard.Views(own + len(made.par))
     call = watched(made.call, f"Force_Contact[{made.element}]: {made.name} ({made.source})")
 
     def guarded(depth: float, rate: float, par: int, out: int) -> int:
         outer = host.state
         try:
-            results = out_at[out]
+            results, given = out_at[out], par_at[par].tolist()[own:]
             at.begin(results, depth)
             if host.seen is not None:
                 host.state = (host.seen[0], inputs[at.TIME], host.seen[1])
             for k in range(at.questions(inputs, depth)):
-                at.keep(results, k, depth, call(*at.question(k, depth, rate)))
+                at.keep(results, k, depth, call(*at.question(k, depth, rate), given))
             return 0
         except guard.PassedOn:
             return Code.RAISED_INTERPRETED

@@ -192,7 +192,8 @@ def _callback(
 ) -> tuple[int, object]:
     """Return the address of the interpreted residual, and what keeps it alive."""
     given_at, out_at = guard.Views(inputs(axes, count)), guard.Views(count)
-    first, values = 1 + 2 * axes, par.tolist()
+    count_of_par = len(par)
+    first, par_at = 1 + 2 * axes, guard.Views(len(par))
     name, source = place
     function = watched(function, f"Force_Element[{element}]: {name} ({source})")
 
@@ -203,9 +204,8 @@ def _callback(
             given = given_at[inputs].tolist()
             host.time = time = given[0]
             f, fdot = given[first : first + count], given[first + count :]
-            result = function(
-                given[1 : 1 + axes], given[1 + axes : first], f, fdot, time, values.copy()
-            )
+            values = par_at[par].tolist() if count_of_par else []
+            result = function(given[1 : 1 + axes], given[1 + axes : first], f, fdot, time, values)
             room = out_at[out]
             for k, number in enumerate(numbers(result, count)):
                 room[k] = number

@@ -162,12 +162,15 @@ class UserNormal(_Called):
     asked: tuple[str, ...] = ()
     reads_time: bool = True
 
-    def call(self, depth: float, rate: float) -> float:
-        """Return the force of the interpreted function at its place; exceptions come through."""
+    def call(self, depth: float, rate: float, par: list[float] | None = None) -> float:
+        """Return the force of the interpreted function at its place; exceptions come through.
+
+        With other parameters than its own where these are given.
+        """
         assert self.function is not None
         given = self.inputs.tolist()
         vectors = [given[k : k + 3] for k in (at.LOCI, at.NI, at.LOCJ, at.NJ)]
-        dflag, par = int(given[at.MODE] != at.EVALUATE), self.par.tolist()
+        dflag, par = int(given[at.MODE] != at.EVALUATE), par or self.par.tolist()
         host.time, host.area = given[at.TIME], given[at.AREA]
         return only_one(
             self.function(

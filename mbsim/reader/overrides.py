@@ -12,8 +12,12 @@ from mbsim.reader.statements import known_attributes
 from mbsim.reader.written import written
 
 _FORM = re.compile(
-    r"\s*(\w+)\s*(?:\[\s*([^\]]*?)\s*\])?(?:\[\s*([1-9]\d*)\s*\])?\s*\.\s*(\w+)\s*=(.*)", re.DOTALL
+    r"\s*(\w+)\s*(?:\[\s*([^\]]*?)\s*\])?(?:\[\s*([1-9]\d*)\s*\])?\s*\.\s*(\w+)"
+    r"\s*(?:\[\s*([1-9]\d*)\s*\])?\s*=(.*)",
+    re.DOTALL,
 )
+#: A list of numbers that a user's subroutine is given.
+_USER = re.compile(r"(\s*USER\s*\()(.*)(\)\s*)", re.IGNORECASE | re.DOTALL)
 _MOST_LISTED = 12
 
 
@@ -46,6 +50,7 @@ def apply_overrides(
         without ids is named by its place among those of its name, ``Simulate[2]``, or by
         its name alone where there is one. ``Element[id][2].attribute=value`` is the first
         change of that element in <Command>, [3] the next.
+        ``Element[id].attribute[2]=value`` is the second number of its ``USER(...)``.
     known : callable, optional
         Returns the attributes that a statement may have, None where that is open.
 
@@ -62,9 +67,11 @@ def apply_overrides(
         if match is None:
             faults.append(f"--set {text}: must be Element[id].attribute=value")
             continue
-        element, index, turn, attribute, value = match.groups()
+        element, index, turn, attribute, row, value = match.groups()
         try:
             node = _owned(_find(sections, element, index, int(turn or 1)), sections, own)
+            if row is not None:
+                value = _with_number(node, attribute, int(row), value)
             _set(node, attribute, value.strip(), f"--set {text}", known(node))
         except LookupError as error:
             faults.append(f"--set {text}: {error.args[0]}")
@@ -125,6 +132,27 @@ def _choices(nodes: list[Node]) -> str:
     return " ".join(names[:_MOST_LISTED]) + more
 
 
+def _numbers(node: Node, name: str, row: int) -> tuple[str, list[str], str]:
+    """Return what is before, in and behind the USER(...) of an attribute, which has so many."""
+    found = node.find(name)
+    match = _USER.fullmatch(found.value) if found is not None else None
+    if match is None:
+        raise LookupError(
+            f"{node.tag}.{name} is no USER(...) in the deck, whose number {row} it is"
+        )
+    numbers = match[2].split(",")
+    if row > len(numbers):
+        raise LookupError(f"USER(...) of {node.tag}.{name} has {len(numbers)} numbers, no {row}")
+    return match[1], numbers, match[3]
+
+
+def _with_number(node: Node, name: str, row: int, value: str) -> str:
+    """Return the USER(...) of an attribute with one of its numbers changed."""
+    before, numbers, behind = _numbers(node, name, row)
+    numbers[row - 1] = value.strip()
+    return f"{before}{','.join(numbers)}{behind}"
+
+
 def _set(node: Node, name: str, value: str, origin: str, known: list[str] | None) -> None:
     """Set or add an attribute; one that the statement does not have is a LookupError."""
     found = node.find(name)
@@ -155,12 +183,14 @@ def value_of(sections: Sequence[Node], name: str) -> str | None:
     match = _FORM.fullmatch(f"{name}=")
     if match is None:
         raise ModelError(f"{name}: must be Element[id].attribute")
-    element, index, turn, attribute, _ = match.groups()
+    element, index, turn, attribute, row, _ = match.groups()
     try:
         node = _find(sections, element, index, int(turn or 1))
         found = node.find(attribute)
         if found is None:
             _check_known(node, attribute, known_attributes(node))
+        if row is not None:
+            return _numbers(node, attribute, int(row))[1][int(row) - 1].strip()
     except LookupError as error:
         raise ModelError(f"{name}: {error.args[0]}") from None
     return found.value if found is not None else None

@@ -93,8 +93,8 @@ def value_in(name: str, text: str | None) -> float:
         value = math.nan
     if not math.isfinite(value):
         raise ModelError(
-            f"sensitivity: {name}={text} is no number; let it look at a Reference_Variable, whose "
-            "expression is one"
+            f"sensitivity: {name}={text} is no number; one of USER(...) is {name}[1] and so on, "
+            "one in an expression that of a Reference_Variable that it looks at"
         )
     return value
 
@@ -157,6 +157,11 @@ def direction(
         slope = np.where(np.isfinite(slope) & (np.abs(slope) > level), slope, 0.0)
         if slope.any():
             arrays[key] = slope
+    if name.endswith("]") and not arrays:
+        raise ModelError(
+            f"sensitivity: {name} is a number that a user's subroutine keeps to itself; those of "
+            "contacts and of Force_Element are known"
+        )
     return Direction(name, value, size, arrays, systems, change)
 
 
@@ -193,8 +198,36 @@ def _tables(system: System) -> dict[str, Array]:
             size[g, POLYHEDRON] = 0.0
             found[f"{_POLYHEDRA}{graphic_id}"] = hull
     found["graphics/size"] = size
+    found |= _without_users(system)
     fixed = system.scene.graphics.body == len(system.body_ids)
     found[_FILLED_ONCE] = np.where(fixed[:, None], system.scene.work.frames, 0.0)
+    return found
+
+
+def _without_users(system: System) -> dict[str, Array]:
+    """Return the arrays that say where users' functions are, or what these read, without that.
+
+    These are made anew with every build.
+    """
+    scene, contacts = system.scene, system.scene.contacts
+    laws = {
+        "normal": (contacts.normal_law.copy(), contacts.normal_par.copy()),
+        "friction": (contacts.friction_law.copy(), contacts.friction_par.copy()),
+        "sliding": (contacts.sliding_law.copy(), contacts.sliding_par.copy()),
+    }
+    for id, user in system.user_laws:
+        k = system.contact_ids.index(id)
+        for law, par in laws.values():
+            if law[k] == user.address:
+                law[k] = 1
+                par[k, : len(user.hidden)] = 0.0
+    found = {}
+    for kind, (law, par) in laws.items():
+        found[f"contacts/{kind}_law"], found[f"contacts/{kind}_par"] = law, par
+    found["contacts/user_normal"] = np.sign(contacts.user_normal)
+    found["users/address"] = np.sign(scene.users.address)
+    for name in ("address", "twin"):
+        found[f"residuals/{name}"] = np.sign(getattr(scene.residuals, name))
     return found
 
 
