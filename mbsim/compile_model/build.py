@@ -26,7 +26,7 @@ from mbsim.compile_model.audit import audit
 from mbsim.compile_model.contacts import ContactTables, contact_tables, kinds_table
 from mbsim.compile_model.graph import make_graph
 from mbsim.compile_model.gravity import Pull
-from mbsim.compile_model.groups import Groups, find_groups, natural_speed
+from mbsim.compile_model.groups import Groups, find_groups, natural_speed, speeds_of
 from mbsim.compile_model.markers import MarkerTable, body_rows
 from mbsim.compile_model.pairing import Plans, plan_pairs
 from mbsim.compile_model.rigid_slots import rigid_slots
@@ -93,6 +93,7 @@ class System:
     user_normal: dict[int, UserNormal] = field(default_factory=dict)  # by contact id
     posts: list[ContactPost] = field(default_factory=list)  # the users' CONTACTPOSTs
     load: float = 0.0  # a usual force, by which friction is judged
+    speeds: list[float] = field(default_factory=list)  # V of each group: `speeds_of`
     residuals: dict[int, UserResidual] = field(default_factory=dict)  # by Force_Element
     nothing: int = -1  # program that is 0, where elements are switched off
 
@@ -461,6 +462,7 @@ def build(
         code.normal,
         code.posts,
         load=judged.load,
+        speeds=speeds_of(model, judged.groups),
         residuals=code.residuals,
         nothing=acts.nothing,
     )

@@ -163,6 +163,16 @@ def natural_speed(units: Units, length: float) -> float:
     return math.sqrt(GRAVITY * units.time_s**2 / units.length_m * length)
 
 
+def speeds_of(model: Model, groups: Groups) -> list[float]:
+    """Return V of each group [L/T]: of its start or weight; of standard gravity without both."""
+    g = float(np.linalg.norm(model.gravity.g))
+    found = []
+    for start, length in zip(groups.start, groups.length, strict=True):
+        speed = max(start, math.sqrt(g * length))
+        found.append(speed if speed > 0.0 else natural_speed(model.units, length))
+    return found
+
+
 def find_groups(model: Model, placement: Placement) -> Groups:
     """Return the groups of moving bodies, in the order of their first bodies.
 

@@ -37,8 +37,8 @@ from mbsim.stepping.arrays import (
     Stepping,
 )
 from mbsim.stepping.displacements import meets_at
-from mbsim.stepping.friction import noise_of
 from mbsim.stepping.points import deepest_of, is_point, put_place, slop_of, take_rows
+from mbsim.stepping.scales import group_at, noise_of
 
 #: A pair goes ahead by this part of its whole motion at least, and so beyond where it touches.
 LEAST_PART = 0.01
@@ -363,7 +363,7 @@ def first_meeting(S: Stepping, first: int, h: float) -> float:
         before, free = closing_speed(S, k, M.before), closing_speed(S, k, M.free)
         if P.gap[k] + 0.5 * h * (before + free) < 0.0:
             part = meets_at(P.gap[k], h, before, free)
-            slowest = max(S.rules.number[P.contact[k], SLOWEST], noise_of(S, h))
+            slowest = max(S.rules.number[P.contact[k], SLOWEST], noise_of(S, group_at(S, k), h))
             if before + part * (free - before) < -slowest:
                 t = min(t, part * h)
     return t
@@ -373,7 +373,7 @@ def first_meeting(S: Stepping, first: int, h: float) -> float:
 def touches(S: Stepping, first: int) -> bool:
     """Return whether some point from `first` on is so near that it meets where it is."""
     for k in range(first, S.tally.count[POINTS]):
-        if S.points.gap[k] <= NEAR_ENOUGH * S.plan.number[SLOP]:
+        if S.points.gap[k] <= NEAR_ENOUGH * S.plan.scale[group_at(S, k), SLOP]:
             return True
     return False
 

@@ -36,22 +36,23 @@ RULE_NUMBERS = 5
 ) = range(10)
 KEPT_POINT, KEPT_NORMAL, KEPT_TANGENT, KEPT_FORCE = 10, 13, 16, 19
 KEPT_COLUMNS = 22
-# entries of `Plan.number`: 1 where the error of steps is not estimated; the length below which gaps
-# and changes of position do not count; what the solver may leave of a velocity, times h; 1 where
-# some kind of pair is not near; how fast positions are projected, see
-# `solver.project_positions`; what may be left of a velocity at most, however short a step; and part
-# of a step's jumps that may; how near to where friction yields a step is to end; the model's own
-# time L/V; how far closing and slipping may go in a step and are none; 1 where bodies at rest may
-# sleep
-FIXED, SLOP, LEFT, SOME_AHEAD, PUSH_SPEED, LEFT_SPEED, LEFT_PART, NEAR, OWN_TIME = range(9)
-NOISE, MAY_SLEEP = 9, 10
-PLAN_NUMBERS = 11
-# entries of `Tally.number`, of the last step tried: what the solver left, as a velocity; its
-# length; the contact that closed fastest in it, and by how much within its length; how far its end
-# is from that of two halves; 1 where velocities jump in it or in either of two halves; the energy
-# that it leaves open by the way it moves bodies on (`energy.left_open`)
-RESIDUAL, STEP_LENGTH, FASTEST, CLOSED, END_OFF, HIT, LEFT_OPEN = range(7)
-TALLY_NUMBERS = 7
+# entries of `Plan.number`: 1 where the error of steps is not estimated; 1 where some kind of pair
+# is not near; part of a step's jumps that the solver may leave; 1 where bodies at rest may sleep;
+# the tolerance
+FIXED, SOME_AHEAD, LEFT_PART, MAY_SLEEP, TOL = range(5)
+PLAN_NUMBERS = 5
+# columns of `Plan.scale`: L; V, also how fast positions are projected (`solver.project_positions`);
+# the group's own time L/V; the length below which gaps and changes of position do not count; how
+# far closing and slipping may go in a step and are none; what the solver may leave of a velocity,
+# times h; and at most, however short a step; how near to where friction yields a step is to end
+LENGTH, SPEED, OWN_TIME, SLOP, NOISE, LEFT, LEFT_SPEED, NEAR = range(8)
+PLAN_SCALES = 8
+# entries of `Tally.number`, of the last step tried: what the solver left, as a velocity, and what
+# it may; its length; the contact that closed fastest in it, and by how much within its length; how
+# far its end is from that of two halves; 1 where velocities jump in it or in either of two halves;
+# the energy that it leaves open by the way it moves bodies on (`energy.left_open`)
+RESIDUAL, MAY_BE_LEFT, STEP_LENGTH, FASTEST, CLOSED, END_OFF, HIT, LEFT_OPEN = range(8)
+TALLY_NUMBERS = 8
 # entries of `Points.given`: axes n, x, z; a x axis for I's arm a, then J's; I^-1 of these, as each
 # body's inertia is; inverse masses of I and J; u by r, a symmetric matrix; its inverse, row by row
 # from the diagonal on, 0 where it has none; 1/W_nn, and W_nx, W_nz over W_nn; of x, z what of W is
@@ -109,6 +110,9 @@ class Plan(NamedTuple):
     """What holds for a whole run."""
 
     number: F1  # (PLAN_NUMBERS,)
+    scale: F2  # (n, PLAN_SCALES) of each group of connected bodies: `compile_model.groups`
+    connected: I1  # (nb + 1,) group of a body, 0 of ground
+    of_contact: I1  # (nc,) group by which a contact is judged
     near: I1  # (nk,) 1 where rows of a kind of pair that are apart are points of contact
     rows: I1  # (nk,) rows of a kind of pair, from its first slot on
     # (nb + 1,) of bodies that joints hold together or forces couple, -1 for free ones and ground
@@ -195,6 +199,8 @@ class Points(NamedTuple):
     full: F2  # (m, 3) with all rebound, see `rebound`
     old: F2  # (m, 3) r before the sweep at hand
     way: F2  # (m, 3) of the sweeps so far
+    speed: F1  # (m,) V of its group
+    least: F1  # (m,) what the solver may leave of its velocity, see `scales.left_of`
     counts: F1  # (m,) 1 over what may be left of its velocity
     push: F1  # (m,) what projected positions
 
@@ -335,6 +341,8 @@ def no_points(m: int, nb: int, wide: int) -> Points:
         full=numbers(m, 3),
         old=numbers(m, 3),
         way=numbers(m, 3),
+        speed=numbers(m),
+        least=numbers(m),
         counts=numbers(m),
         push=numbers(m),
     )

@@ -44,6 +44,7 @@ from mbsim.stepping.arrays import (
     FASTEST,
     FIXED,
     LEFT_OPEN,
+    MAY_BE_LEFT,
     POINTS,
     RESIDUAL,
     SLEEPERS,
@@ -51,7 +52,6 @@ from mbsim.stepping.arrays import (
     Stepping,
 )
 from mbsim.stepping.forces import find_forces
-from mbsim.stepping.friction import left_of
 
 #: Rounding of friction on its cone.
 CONE_ROUNDING = 1e-12
@@ -95,8 +95,7 @@ def examine_step(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> None:
         take_sample(scene, S, t, y)
         return
     tally[STEPS_ALL] += 1.0
-    allowed = left_of(S, number[STEP_LENGTH])
-    note(scene, UNSOLVED_IMPULSES, number[RESIDUAL], allowed, t, -1)
+    note(scene, UNSOLVED_IMPULSES, number[RESIDUAL], number[MAY_BE_LEFT], t, -1)
     examine_points(scene, S, t)
     if S.plan.number[FIXED] == 1.0 and len(scene.contacts.id) > 0:
         note(scene, STEP_END, number[END_OFF], explained(scene, S), t, int(number[FASTEST]))

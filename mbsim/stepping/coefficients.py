@@ -50,9 +50,9 @@ _LAW = ctypes.CFUNCTYPE(
 )
 #: Numbers of memory of any law at most, with those that it carries.
 _MEMORY = max(FRICTION_LAWS[name].memory + FRICTION_LAWS[name].carried for name in FRICTION_LAWS)
-#: Slip speeds at which a law is asked, over the model's own speed: from, to, and how many.
+#: Slip speeds at which a law is asked, over its group's speed: from, to, and how many.
 SLOWEST_ASKED, FASTEST_ASKED, ASKED = 1e-7, 1e2, 721
-#: A slip, over the model's own speed, up to which what gives before it slips is at rest.
+#: A slip, over the group's speed, up to which what gives before it slips is at rest.
 AT_REST = 1e-12
 #: What friction may change by where a law looks at what rigid contact does not know.
 SAME = 1e-6
@@ -78,7 +78,7 @@ class Coefficients:
             knots.append(self._friction(c, contact))
             drop = number[STICKING] - knots[c][0, 1]
             number[DROPS] = float(drop > (1.0 - NEARLY) * number[STICKING])
-            number[RESTITUTION] = self._restitution(contact)
+            number[RESTITUTION] = self._restitution(c, contact)
             if contact.cnf_type == "POISSON":
                 number[SLOWEST] = contact.normal_trans_vel
         first = np.concatenate([[0], np.cumsum([len(rows) for rows in knots])]).astype(np.int64)
@@ -86,6 +86,16 @@ class Coefficients:
 
     def _name(self, contact: Contact) -> str:
         return element_name(self.system.model.file, "Force_Contact", contact.id)
+
+    def _speed(self, c: int) -> float:
+        """Return V of the group of bodies by which a contact is judged."""
+        return self.system.speeds[int(self.system.scene.scales.of_contact[c])]
+
+    def _load(self, c: int) -> float:
+        """Return a usual force of a contact: m V^2/L of its group, m of the heaviest body."""
+        scales = self.system.scene.scales
+        g = int(scales.of_contact[c])
+        return float(scales.mass[g]) * self._speed(c) ** 2 / float(scales.length[g])
 
     def _refuse(self, contact: Contact, why: str) -> ModelError:
         """Return what says that a contact cannot be rigid."""
@@ -114,7 +124,7 @@ class Coefficients:
                 )
             if law.memory:
                 # what such a law keeps is the give that rigid contact has not
-                number[FIRST_SPEED] = AT_REST * float(self.system.scene.world.scale[1])
+                number[FIRST_SPEED] = AT_REST * self._speed(c)
                 number[STICKING] = max(contact.mu_static, contact.mu_dynamic)
                 self.said.append(
                     f"{self._name(contact)}: {law.name} as Coulomb's law: it sticks up to "
@@ -128,8 +138,9 @@ class Coefficients:
     def _table(self, c: int, contact: Contact) -> Knots:
         """Fill the coefficients by asking the contact's function; return those of what slides."""
         number, table = self._number[c], self.system.scene.contacts
+        group = int(self.system.scene.scales.of_contact[c])
         law = (contact.asks_user and contact.id, int(table.friction_law[c]))
-        key = (*law, table.friction_par[c].tobytes())
+        key = (*law, table.friction_par[c].tobytes(), group)
         if key not in self._tables:
             self._tables[key] = self._ask(c, contact)
         number[FIRST_SPEED], number[STICKING], knots = self._tables[key]
@@ -137,7 +148,7 @@ class Coefficients:
 
     def _ask(self, c: int, contact: Contact) -> tuple[float, float, Knots]:
         """Return up to which slip a contact sticks, its coefficient then, and those beyond."""
-        usual = float(self.system.scene.world.scale[1])
+        usual = self._speed(c)
         speeds = usual * np.geomspace(SLOWEST_ASKED, FASTEST_ASKED, ASKED)
         mu = np.array([self._asked(c, contact, v) for v in speeds])
         peak = int(mu.argmax())
@@ -164,7 +175,7 @@ class Coefficients:
         """Return Fx, Fy, ... of the contact's law with these inputs changed."""
         table = self.system.scene.contacts
         given, out = np.zeros(FRICTION_INPUTS + _MEMORY), np.zeros(MEMORY_OUT + _MEMORY)
-        given[NFORCE_IN] = changes.get("normal", self.system.load or 1.0)
+        given[NFORCE_IN] = changes.get("normal", self._load(c))
         given[XDOT_IN : XDOT_IN + 2] = changes["slip"]
         given[TIME_IN], given[X_IN] = changes.get("time", 0.0), changes.get("x", 0.0)
         given[LOCI_IN : LOCI_IN + 3] = changes.get("place", 0.0)
@@ -184,7 +195,7 @@ class Coefficients:
                 "the time": self._call(c, contact, slip=(v, 0.0), time=1.0)[0],
                 "LOCI": self._call(c, contact, slip=(v, 0.0), place=1.0)[0],
                 "more than the size of the normal force": self._call(
-                    c, contact, slip=(v, 0.0), normal=3.0 * (self.system.load or 1.0)
+                    c, contact, slip=(v, 0.0), normal=3.0 * self._load(c)
                 )[0],
                 "the direction of slip": self._call(c, contact, slip=(0.0, v))[1],
             }
@@ -202,7 +213,7 @@ class Coefficients:
             )
         return mu
 
-    def _restitution(self, contact: Contact) -> float:
+    def _restitution(self, c: int, contact: Contact) -> float:
         """Return the coefficient of restitution of a contact."""
         if contact.cnf_type == "POISSON":
             return float(contact.restitution_coef or 0.0)
@@ -212,7 +223,7 @@ class Coefficients:
             )
         if contact.restitution_coef is not None and contact.cnf_type in ("HERTZ", "HUNT_CROSSLEY"):
             return float(contact.restitution_coef)
-        speed, mass = self._impact(contact)
+        speed, mass = self._impact(c, contact)
         e = rebound(self.system, contact, speed, mass)
         self.said.append(
             f"{self._name(contact)}: restitution {e:.3g}, which its {contact.cnf_type} has at a "
@@ -220,7 +231,7 @@ class Coefficients:
         )
         return e
 
-    def _impact(self, contact: Contact) -> tuple[float, float]:
+    def _impact(self, c: int, contact: Contact) -> tuple[float, float]:
         """Return the closing speed and the mass (F = m a) at which a contact is looked at."""
         scene, system = self.system.scene, self.system
         body = dict(zip(system.graphic_ids, scene.graphics.body.tolist(), strict=True))
@@ -234,7 +245,7 @@ class Coefficients:
         mass = 1.0 / (inverse(contact.i_graphics_id) + inverse(contact.j_graphics_id))
         if contact.ref_velocity is not None:
             return float(contact.ref_velocity), mass
-        return float(scene.world.scale[1]), mass
+        return self._speed(c), mass
 
 
 def highest(asked: Callable[[float], float], low: float, high: float) -> float:

@@ -20,8 +20,17 @@ from mbsim.core.rotation import matrix_from_quaternion, norm, unrotate, vector
 from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
 from mbsim.dynamics.bodies.configuration import turn
 from mbsim.dynamics.bodies.kinematics import place_bodies
-from mbsim.stepping.arrays import ASLEEP, LEFT_SPEED, POINTS, STEP_LENGTH, W_NN, Stepping
+from mbsim.stepping.arrays import (
+    ASLEEP,
+    LEFT_SPEED,
+    POINTS,
+    SLOP,
+    STEP_LENGTH,
+    W_NN,
+    Stepping,
+)
 from mbsim.stepping.one_point import velocity_of
+from mbsim.stepping.scales import group_at
 
 #: Of `Points.part` and `Motion.part`: no impact with restitution.
 NO_IMPACT = 2.0
@@ -47,7 +56,7 @@ def meets_at(gap: float, h: float, before: float, free: float) -> float:
 
 
 @jitable
-def start_parts(scene: Scene, S: Stepping, count: int, h: float, slop: float) -> None:
+def start_parts(scene: Scene, S: Stepping, count: int, h: float) -> None:
     """Fill what each point that presses makes of the way of its two bodies."""
     P, M, ground = S.points, S.motion, len(S.rest.body)
     M.part[ground] = M.touch[ground] = NO_IMPACT
@@ -64,7 +73,7 @@ def start_parts(scene: Scene, S: Stepping, count: int, h: float, slop: float) ->
         if part == NO_IMPACT:
             flies = PRESSED
             after = velocity_of(P, k, 0, M.v)
-            if 0.5 * h * abs(after - P.closing[k]) > slop:
+            if 0.5 * h * abs(after - P.closing[k]) > S.plan.scale[group_at(S, k), SLOP]:
                 free = velocity_of(P, k, 0, M.free)
                 part, touch = 0.0, meets_at(P.gap[k], h, P.closing[k], free)
         for b in (i, j):
@@ -91,13 +100,13 @@ def take_least(S: Stepping, i: int, j: int) -> bool:
 
 
 @jitable
-def spread_parts(scene: Scene, S: Stepping, count: int, h: float, slop: float) -> None:
+def spread_parts(scene: Scene, S: Stepping, count: int, h: float) -> None:
     """Find the bodies that a contact stops in the step, all that press on them, and joints hold.
 
     Between two bodies of different parts a contact that stays closed would open or go deeper.
     """
     P, plan, ground = S.points, S.plan, len(S.rest.body)
-    start_parts(scene, S, count, h, slop)
+    start_parts(scene, S, count, h)
     changed = True
     while changed:
         changed = False
@@ -147,7 +156,7 @@ def comes_at(S: Stepping, k: int) -> float:
     What rises at its begin may come down within it. Of what other points hold, and would come
     there alone, the solver may leave an impulse of a few times what it may leave.
     """
-    P, left = S.points, JUMPS * S.plan.number[LEFT_SPEED]
+    P, left = S.points, JUMPS * S.plan.scale[group_at(S, k), LEFT_SPEED]
     speed = P.closing[k]
     if P.part[k] != NO_IMPACT and P.given[k, W_NN] * P.r[k, 0] > left:
         met = speed + P.part[k] * (velocity_of(P, k, 0, S.motion.free) - speed)
@@ -158,9 +167,9 @@ def comes_at(S: Stepping, k: int) -> float:
 @jitable
 def velocities_jump(scene: Scene, S: Stepping) -> bool:
     """Return whether some body met another one in the step: velocities jump within it."""
-    P, M, seen = S.points, S.motion, S.plan.number[LEFT_SPEED]
+    P, M, scale = S.points, S.motion, S.plan.scale
     for k in range(S.tally.count[POINTS]):
-        if P.r[k, 0] > 0.0 and comes_at(S, k) > seen:
+        if P.r[k, 0] > 0.0 and comes_at(S, k) > scale[group_at(S, k), LEFT_SPEED]:
             return True
     if S.tally.count[POINTS] == 0:
         return False
@@ -169,7 +178,7 @@ def velocities_jump(scene: Scene, S: Stepping) -> bool:
         v, free, before = M.v[b], M.free[b], M.before[b]
         jump = norm((v[0] - before[0], v[1] - before[1], v[2] - before[2]))
         usual = norm((free[0] - before[0], free[1] - before[1], free[2] - before[2]))
-        if jump > seen + JUMPS * usual:
+        if jump > scale[S.plan.connected[b], LEFT_SPEED] + JUMPS * usual:
             return True
     return False
 

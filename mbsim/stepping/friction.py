@@ -11,26 +11,21 @@ from mbsim.stepping.arrays import (
     DROPS,
     DUE,
     FIRST_SPEED,
-    LEFT,
-    LEFT_SPEED,
     NEAR,
-    NOISE,
     OF_FIRST,
     OF_SECOND,
     OF_WHOLE,
     OWN_TIME,
-    PUSH_SPEED,
     STICKING,
+    TOL,
     W_XX,
     W_ZZ,
     Stepping,
 )
 from mbsim.stepping.displacements import NO_IMPACT
 from mbsim.stepping.one_point import apply, slip_at, solve_point, velocity_of
+from mbsim.stepping.scales import group_at, noise_of
 
-#: Closing and slipping are none up to so many times what the solver may leave of a velocity at
-#: most, however short a step.
-NOISE_OF_SPEED = 30.0
 #: Changes of mu that do not count, over tol, and at most.
 YIELDS, LARGEST_YIELD = 10.0, 1e-3
 #: A load as large as it may be.
@@ -41,23 +36,6 @@ CLOSE, SHARPER = 0.9, 1e-5
 AT_END = 2e-3
 #: A step goes so far of what is left to where friction yields, while that is not known well.
 CLOSER = 0.6
-
-
-@jitable
-def left_of(S: Stepping, h: float) -> float:
-    """Return what the solver may leave of a velocity in a step h.
-
-    What it moves in the step does not count then; nor, over the model's own time, what is left of a
-    velocity behind an impact in a step that is very short.
-    """
-    return min(S.plan.number[LEFT] / h, S.plan.number[LEFT_SPEED])
-
-
-@jitable
-def noise_of(S: Stepping, h: float) -> float:
-    """Return the speed up to which closing and slipping in a step h are none."""
-    number = S.plan.number
-    return min(number[NOISE] / h, NOISE_OF_SPEED * number[LEFT_SPEED])
 
 
 @jitable
@@ -97,15 +75,14 @@ def load_of(S: Stepping, begin: int, end: int) -> float:
 
 
 @jitable
-def let_yield(S: Stepping, count: int, noise: float) -> bool:
+def let_yield(S: Stepping, count: int, h: float, sharp: float) -> bool:
     """Lower mu where what stuck slips, to that of its slip; return whether that changed much.
 
     A step in which friction yields is then one that slides from its begin: steps by error end where
-    it yields (`part_to_yield`).
+    it yields (`part_to_yield`). The solver leaves `sharp` times what it may.
     """
     P, M, changed, begin = S.points, S.motion, False, 0
-    tol = S.plan.number[LEFT_SPEED] / S.plan.number[PUSH_SPEED]
-    least = 1.0 - min(YIELDS * tol, LARGEST_YIELD)
+    least = 1.0 - min(YIELDS * S.plan.number[TOL], LARGEST_YIELD)
     while begin < count:
         end = begin + 1
         while end < count and P.key[end] == P.key[begin]:
@@ -118,7 +95,7 @@ def let_yield(S: Stepping, count: int, noise: float) -> bool:
             slip = math.sqrt(x * x + z * z)
             if load < 0.0:
                 load = load_of(S, begin, end)
-            if load < SATURATED and slip <= noise:
+            if load < SATURATED and slip <= sharp * noise_of(S, group_at(S, k), h):
                 continue
             mu = coefficient(S, P.contact[k], slip)
             if mu < least * P.mu[k]:
@@ -129,10 +106,10 @@ def let_yield(S: Stepping, count: int, noise: float) -> bool:
 
 
 @jitable
-def let_stick(S: Stepping, count: int, noise: float) -> bool:
+def let_stick(S: Stepping, count: int, h: float) -> bool:
     """Let a pair stick by all it can whose slip turns round in the step; return whether one does.
 
-    Or begins below `noise`. On its way it stops: whether it goes on then is for its sticking
+    Or begins below what is none. On its way it stops: whether it goes on then is for its sticking
     friction to say.
     """
     P, M, changed = S.points, S.motion, False
@@ -140,7 +117,7 @@ def let_stick(S: Stepping, count: int, noise: float) -> bool:
         sticking = S.rules.number[P.contact[k], STICKING]
         if P.r[k, 0] == 0.0 or P.holds[k] >= sticking:
             continue
-        along, square = 0.0, 0.0
+        along, square, noise = 0.0, 0.0, noise_of(S, group_at(S, k), h)
         for a in range(1, 3):
             before = velocity_of(P, k, a, M.before)
             along += before * velocity_of(P, k, a, M.v)
@@ -152,7 +129,7 @@ def let_stick(S: Stepping, count: int, noise: float) -> bool:
 
 
 @jitable
-def let_jam(S: Stepping, count: int, h: float, allowed: float) -> bool:
+def let_jam(S: Stepping, count: int, h: float, sharp: float) -> bool:
     """Take their rebound from points that impulses cannot give it to; return whether from any.
 
     A body that friction holds on both sides, as a ball in a wedge that is steeper than its angle,
@@ -163,7 +140,7 @@ def let_jam(S: Stepping, count: int, h: float, allowed: float) -> bool:
     for k in range(count):
         if P.mu[k] == 0.0 or P.part[k] == NO_IMPACT or P.ahead[k] >= 0.0:
             continue
-        if solve_point(P, S.motion.v, k) <= allowed:
+        if solve_point(P, S.motion.v, k) <= sharp * P.least[k]:
             continue
         apply(P, k, S.motion.v, (-P.r[k, 0], -P.r[k, 1], -P.r[k, 2]))
         P.r[k, 0] = P.r[k, 1] = P.r[k, 2] = 0.0
@@ -173,12 +150,11 @@ def let_jam(S: Stepping, count: int, h: float, allowed: float) -> bool:
 
 @jitable
 def left_near_yield(S: Stepping, count: int) -> float:
-    """Return what may be left of a velocity where friction is about to yield, inf where none is.
+    """Return what may be left where friction is about to yield, inf where it is not.
 
-    So exactly is the load known then.
+    That is over what may be left elsewhere: so exactly is the load known then.
     """
     P, least, begin = S.points, math.inf, 0
-    tol = S.plan.number[LEFT_SPEED] / S.plan.number[PUSH_SPEED]
     while begin < count:
         end, c, most = begin + 1, P.contact[begin], P.mu[begin] * P.r[begin, 0]
         while end < count and P.key[end] == P.key[begin]:
@@ -187,9 +163,8 @@ def left_near_yield(S: Stepping, count: int) -> float:
         rule = S.rules.number[c]
         drops = rule[DROPS] == 1.0 and P.holds[begin] >= rule[STICKING]
         if drops and most > 0.0 and load_of(S, begin, end) > CLOSE:
-            least = min(
-                least, SHARPER * tol * most * max(P.given[begin, W_XX], P.given[begin, W_ZZ])
-            )
+            across = max(P.given[begin, W_XX], P.given[begin, W_ZZ])
+            least = min(least, SHARPER * S.plan.number[TOL] * most * across / P.least[begin])
         begin = end
     return least
 
@@ -241,15 +216,16 @@ def part_to_yield(S: Stepping, h: float) -> float:
     Where a contact's coefficient drops as it yields its force jumps; where it does not, it needs no
     end of a step. It is found to `NEAR` by steps that end there; one that begins there slides.
     """
-    part, near = 1.0, max(S.plan.number[NEAR] / h, AT_END)
+    part = 1.0
     for c in range(len(S.tally.load)):
-        load = S.tally.load[c]
+        load, scale = S.tally.load[c], S.plan.scale[S.plan.of_contact[c]]
+        near = max(scale[NEAR] / h, AT_END)
         if S.rules.number[c, DROPS] == 0.0 or load[DUE] == 1.0 or load[OF_FIRST] < 0.0:
             continue
         first, whole, second = load[OF_FIRST], load[OF_WHOLE], load[OF_SECOND]
         if first < SATURATED and 0.0 <= whole < SATURATED and 0.0 <= second < SATURATED:
             at, unsure = yields_at(first, whole, second)
-            if at < 1.0 + near and unsure * min(h / S.plan.number[OWN_TIME], 1.0) > near:
+            if at < 1.0 + near and unsure * min(h / scale[OWN_TIME], 1.0) > near:
                 part = min(part, CLOSER * at)
             elif at < 1.0 - near:
                 part = min(part, at)
@@ -269,9 +245,9 @@ def part_to_yield(S: Stepping, h: float) -> float:
 @jitable
 def keep_yield(S: Stepping, h: float) -> None:
     """Note of the step that is taken how long behind its end friction yields, or whether there."""
-    near = max(S.plan.number[NEAR] / h, AT_END)
     for c in range(len(S.tally.load)):
         load = S.tally.load[c]
+        near = max(S.plan.scale[S.plan.of_contact[c], NEAR] / h, AT_END)
         first, whole, second = load[OF_FIRST], load[OF_WHOLE], load[OF_SECOND]
         due = second < 0.0 or second >= SATURATED
         load[AHEAD] = math.inf

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from mbsim.core.jitable import jitable
 from mbsim.stepping.arrays import (
-    OWN_TIME,
-    PUSH_SPEED,
+    LENGTH,
     RESTITUTION,
     SLOP,
     SLOWEST,
@@ -17,10 +16,10 @@ from mbsim.stepping.arrays import (
     Stepping,
 )
 from mbsim.stepping.displacements import NO_IMPACT, meets_at
-from mbsim.stepping.friction import noise_of
 from mbsim.stepping.one_point import apply, velocity_of
+from mbsim.stepping.scales import group_at, noise_of
 
-#: So near to a surface, over the model's length, what would meet it without rebound is held there.
+#: So near to a surface, over its group's length, what would meet it without rebound is held there.
 NEARLY = 0.01
 #: A point that is let go of may close so many times faster than it does.
 LET_GO = 100.0
@@ -34,8 +33,10 @@ def look_ahead(S: Stepping, k: int, h: float) -> None:
     point comes in at u, and leaves at e u; what accelerates it goes on behind the impact.
     """
     P, M, rule = S.points, S.motion, S.rules.number[S.points.contact[k]]
+    g = group_at(S, k)
+    slop = S.plan.scale[g, SLOP]
     gap, before = P.gap[k], P.closing[k]
-    if P.was[k] >= 0 and 0.0 < gap <= S.plan.number[SLOP]:
+    if P.was[k] >= 0 and 0.0 < gap <= slop:
         # it lies on: to follow what does not count would keep all that rests in motion
         gap = 0.0
     free = velocity_of(P, k, 0, M.free)
@@ -47,8 +48,8 @@ def look_ahead(S: Stepping, k: int, h: float) -> None:
         P.ahead[k] = max(P.ahead[k], -free)
         return
     part = meets_at(gap, h, before, free)
-    comes, slowest = before + part * (free - before), max(rule[SLOWEST], noise_of(S, h))
-    if comes >= -slowest or (gap <= S.plan.number[SLOP] and before >= -slowest):
+    comes, slowest = before + part * (free - before), max(rule[SLOWEST], noise_of(S, g, h))
+    if comes >= -slowest or (gap <= slop and before >= -slowest):
         return
     leaves = -rule[RESTITUTION] * comes + (1.0 - part) * (free - before)
     P.ahead[k] = -max(leaves, 0.0)
@@ -62,11 +63,12 @@ def is_held(S: Stepping, k: int, h: float) -> bool:
     They fly there; with the impulses of the last step they do not. Were they taken to meet, both
     would be pushed off a place that they never come to.
     """
-    P, M, number, gap = S.points, S.motion, S.plan.number, S.points.gap[k]
-    if gap <= number[SLOP] or gap + h * P.closing[k] < 0.0:
+    P, M, gap = S.points, S.motion, S.points.gap[k]
+    scale = S.plan.scale[group_at(S, k)]
+    if gap <= scale[SLOP] or gap + h * P.closing[k] < 0.0:
         # it is there, or comes as it moves
         return False
-    if P.ahead[k] >= 0.0 and gap <= NEARLY * number[OWN_TIME] * number[PUSH_SPEED]:
+    if P.ahead[k] >= 0.0 and gap <= NEARLY * scale[LENGTH]:
         # it stays where it is: what rests does not rock on what is left of velocities
         return False
     if M.changed[P.body[k, 0]] == 1 or M.changed[P.body[k, 1]] == 1:
@@ -98,13 +100,14 @@ def postpone(S: Stepping, count: int, h: float) -> bool:
         rule = S.rules.number[P.contact[k]]
         if P.r[k, 0] == 0.0 or rule[RESTITUTION] == 0.0 or P.part[k] != NO_IMPACT:
             continue
-        if P.gap[k] <= S.plan.number[SLOP]:
+        g = group_at(S, k)
+        if P.gap[k] <= S.plan.scale[g, SLOP]:
             continue
         # without its impulse
         u = velocity_of(P, k, 0, M.v)
         for a in range(3):
             u -= P.given[k, W_NN + a] * P.r[k, a]
-        if u >= -max(rule[SLOWEST], noise_of(S, h)):
+        if u >= -max(rule[SLOWEST], noise_of(S, g, h)):
             continue
         apply(P, k, M.v, (-P.r[k, 0], -P.r[k, 1], -P.r[k, 2]))
         P.r[k, 0] = P.r[k, 1] = P.r[k, 2] = 0.0

@@ -15,10 +15,9 @@ from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT
 from mbsim.stepping.arrays import (
     AXES,
     LEFT,
+    LENGTH,
     LIGHT,
-    OWN_TIME,
     POINTS,
-    PUSH_SPEED,
     SLOP,
     SPIN,
     TURN,
@@ -81,14 +80,14 @@ def is_point(scene: Scene, pair: int, s: int) -> bool:
 def slop_of(scene: Scene, S: Stepping, gi: int, gj: int) -> float:
     """Return how deep two graphics may be in each other at a step's end.
 
-    It is to the smaller one's diameter what `SLOP` is to the length of the scene, so that a small
-    body in a large scene is no deeper than in a small one; but more than what the solver may leave
+    It is to the smaller one's diameter what `SLOP` is to the length of their group, so that a small
+    body in a large one is no deeper than in a small one; but more than what the solver may leave
     of velocities moves bodies by.
     """
-    number = S.plan.number
+    i, j = scene.graphics.body[gi], scene.graphics.body[gj]
+    scale = S.plan.scale[S.plan.connected[i if i != len(scene.bodies.mass) else j]]
     size = 2.0 * min(scene.graphics.radius[gi], scene.graphics.radius[gj])
-    part = size / (number[OWN_TIME] * number[PUSH_SPEED])
-    return max(min(part, 1.0) * number[SLOP], 2.0 * number[LEFT])
+    return max(min(size / scale[LENGTH], 1.0) * scale[SLOP], 2.0 * scale[LEFT])
 
 
 @jitable

@@ -26,6 +26,7 @@ from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
 from mbsim.stepping.arrays import Stepping
 from mbsim.stepping.displacements import NO_IMPACT
 from mbsim.stepping.one_point import velocity_of
+from mbsim.stepping.scales import left_of
 from mbsim.stepping.sleep import root_of
 from mbsim.stepping.solver import MOST_LEFT, solve_points
 
@@ -90,17 +91,18 @@ def add_work(S: Stepping, count: int) -> None:
 
 
 @jitable
-def does_work(S: Stepping, b: int, allowed: float) -> bool:
+def does_work(S: Stepping, b: int, h: float, sharp: float) -> bool:
     """Return whether contacts of an island do work with all rebound, beyond what solving leaves."""
     work = S.motion.work[b]
     whole = work[WITHOUT] + work[LINEAR] + work[SQUARE]
+    allowed = sharp * left_of(S, S.plan.connected[b], h)
     return not whole <= MOST_LEFT * allowed * work[SIZE]
 
 
 @jitable
-def part_given(S: Stepping, b: int, allowed: float) -> float:
+def part_given(S: Stepping, b: int, h: float, sharp: float) -> float:
     """Return the part of all rebound that an island gets."""
-    if not does_work(S, b, allowed):
+    if not does_work(S, b, h, sharp):
         return 1.0
     work = S.motion.work[b]
     # gaps that close, and forces, may let contacts do a little work without rebound too
@@ -127,7 +129,7 @@ def keep_full(scene: Scene, S: Stepping, count: int) -> None:
 
 
 @jitable
-def stop_all(S: Stepping, count: int, h: float, allowed: float) -> bool:
+def stop_all(S: Stepping, count: int, h: float, sharp: float) -> bool:
     """Take their rebound from points of islands whose contacts do work; return whether from any.
 
     `push` keeps what it was.
@@ -137,19 +139,19 @@ def stop_all(S: Stepping, count: int, h: float, allowed: float) -> bool:
         P.push[k] = 0.0
         if P.part[k] == NO_IMPACT or P.ahead[k] >= 0.0 or P.full[k, 0] == 0.0:
             continue
-        if does_work(S, island_of(S, k), allowed):
+        if does_work(S, island_of(S, k), h, sharp):
             P.push[k], P.ahead[k], some = P.ahead[k], max(P.gap[k], 0.0) / h, True
     return some
 
 
 @jitable
-def mix(scene: Scene, S: Stepping, count: int, allowed: float) -> None:
+def mix(scene: Scene, S: Stepping, count: int, h: float, sharp: float) -> None:
     """Let r and v be those with the part of all rebound that each island gets."""
     P, M = S.points, S.motion
     for k in range(count):
         if P.r[k, 0] == 0.0 and P.full[k, 0] == 0.0:
             continue
-        part = part_given(S, island_of(S, k), allowed)
+        part = part_given(S, island_of(S, k), h, sharp)
         for a in range(3):
             P.r[k, a] = part * P.full[k, a] + (1.0 - part) * P.r[k, a]
         if P.push[k] != 0.0 and part > 0.0:
@@ -158,18 +160,18 @@ def mix(scene: Scene, S: Stepping, count: int, allowed: float) -> None:
             P.part[k] = NO_IMPACT
     for row in range(bodies_awake(scene)):
         b = body_awake(scene, row)
-        part = part_given(S, root_of(S.rest.parent, b), allowed)
+        part = part_given(S, root_of(S.rest.parent, b), h, sharp)
         for c in range(6):
             M.v[b, c] = part * M.full[b, c] + (1.0 - part) * M.v[b, c]
 
 
 @jitable
 def limit_rebound(
-    scene: Scene, S: Stepping, count: int, h: float, allowed: tuple[float, float]
+    scene: Scene, S: Stepping, count: int, h: float, may: tuple[float, float]
 ) -> tuple[float, int, int]:
     """Let impacts give back no more than contacts may; return what is left, sweeps, Newtons.
 
-    Where they give back all, nothing is solved: 0 is left then.
+    Where they give back all, nothing is solved: 0 is left then. `may` as in `solver.sweep_on`.
     """
     P, M, impacts = S.points, S.motion, False
     for k in range(count):
@@ -179,10 +181,10 @@ def limit_rebound(
     keep_full(scene, S, count)
     join_islands(scene, S, count)
     add_work(S, count)
-    if not stop_all(S, count, h, allowed[0]):
+    if not stop_all(S, count, h, may[0]):
         return 0.0, 0, 0
-    left, sweeps, newtons, _ = solve_points(P, M, len(S.rest.body), count, allowed)
+    left, sweeps, newtons, _ = solve_points(P, M, len(S.rest.body), count, may)
     join_islands(scene, S, count)
     add_work(S, count)
-    mix(scene, S, count, allowed[0])
+    mix(scene, S, count, h, may[0])
     return left, sweeps, newtons

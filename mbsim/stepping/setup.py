@@ -11,8 +11,6 @@ from mbsim.arrays.codes import (
     OF_POINTS,
     POINTS,
     ROW_OF,
-    SCALE_LENGTH,
-    SCALE_SPEED,
 )
 from mbsim.arrays.hooks import Hook
 from mbsim.compile_model.program_dependence import find_depends
@@ -36,6 +34,7 @@ from mbsim.stepping.arrays import (
     LEFT,
     LEFT_PART,
     LEFT_SPEED,
+    LENGTH,
     MAY_SLEEP,
     NEAR,
     NEWTONS,
@@ -44,11 +43,13 @@ from mbsim.stepping.arrays import (
     OF_J,
     OWN_TIME,
     PLAN_NUMBERS,
+    PLAN_SCALES,
     PROJECTED,
-    PUSH_SPEED,
     SLEEPERS,
     SLOP,
     SOME_AHEAD,
+    SPEED,
+    TOL,
     UNSOLVED,
     Plan,
     Stepping,
@@ -61,6 +62,7 @@ if TYPE_CHECKING:
     from mbsim.arrays.state import Broadphase
     from mbsim.compile_model.build import System
     from mbsim.compile_model.tangent import Depends
+    from mbsim.core.arrays import F2 as Numbers
     from mbsim.core.arrays import I1 as Indices
     from mbsim.core.arrays import I2 as Table
 
@@ -184,23 +186,33 @@ def _plan(system: System, fixed: bool, tol: float, coupled: list[set[int]], forc
         elif kind.region:
             scene.kinds.kernel[k] = pair_address(PAIRS[kind.closed_form])
     number = np.zeros(PLAN_NUMBERS)
-    length = float(scene.world.scale[SCALE_LENGTH])
-    number[FIXED] = float(fixed)
+    number[FIXED], number[TOL] = float(fixed), tol
     group, members, first = _groups(system, coupled)
     number[SOME_AHEAD] = float(not near.all())
-    number[PUSH_SPEED] = float(scene.world.scale[SCALE_SPEED])
-    number[LEFT_SPEED] = tol * number[PUSH_SPEED]
     number[LEFT_PART] = min(JUMPS * tol, MOST_JUMPS)
-    number[OWN_TIME] = length / number[PUSH_SPEED]
-    number[NEAR] = tol * number[OWN_TIME]
-    number[SLOP], number[NOISE] = COUNTS * tol * length, NONE_BELOW * tol * length
-    number[LEFT] = LEAVES * tol * length
     sources = [model.transient, *(simulation.transient for simulation in model.simulations)]
     awake = any(source is not None and source.sleep is False for source in sources)
     number[MAY_SLEEP] = float(not awake)
     place = np.zeros(len(group), dtype=np.int64)
     place[members] = np.arange(len(members)) - first[group[members]]
-    return Plan(number, near, rows, group, members, place, first, force)
+    connected = np.append(scene.scales.group, 0)
+    scale = _scales(system, tol)
+    of_contact = scene.scales.of_contact
+    return Plan(
+        number, scale, connected, of_contact, near, rows, group, members, place, first, force
+    )
+
+
+def _scales(system: System, tol: float) -> Numbers:
+    """Return by what each group of connected bodies is judged (groups, PLAN_SCALES)."""
+    scales = system.scene.scales
+    scale = np.zeros((len(scales.length), PLAN_SCALES))
+    for row, length, speed in zip(scale, scales.length, system.speeds, strict=True):
+        row[LENGTH], row[SPEED], row[OWN_TIME] = length, speed, length / speed
+        row[SLOP], row[NOISE] = COUNTS * tol * length, NONE_BELOW * tol * length
+        row[LEFT], row[LEFT_SPEED] = LEAVES * tol * length, tol * speed
+        row[NEAR] = tol * row[OWN_TIME]
+    return scale
 
 
 def _groups(system: System, coupled: list[set[int]]) -> tuple[Indices, Indices, Indices]:

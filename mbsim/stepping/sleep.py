@@ -1,8 +1,8 @@
 """Bodies at rest: an island of them sleeps until something touches or loads one of them.
 
 An island is what contact points join, whether they press or not, but for ground. It sleeps where
-every body of it was still for `CALM` steps and a quarter of the model's own time: slower than what
-the solver may leave of a velocity (`friction.left_of`), nothing but weight acts on it, and no joint
+every body of it was still for `CALM` steps and a quarter of its own time: slower than what
+the solver may leave of a velocity (`scales.left_of`), nothing but weight acts on it, and no joint
 holds it. Its velocities are 0 then; its forces are those of its last step, which nothing changes.
 
 A sleeping body gives no contact points with what sleeps or is ground, so it is neither measured nor
@@ -42,10 +42,10 @@ from mbsim.stepping.arrays import (
     Stepping,
 )
 from mbsim.stepping.free_motion import stand
-from mbsim.stepping.friction import left_of
 from mbsim.stepping.kept import index_kept
+from mbsim.stepping.scales import left_of
 
-#: Steps in a row in which a body has to be still, and for how long, over the model's own time L/V.
+#: Steps in a row in which a body has to be still, and for how long, over its group's own time L/V.
 CALM, LONG = 16, 0.25
 
 
@@ -182,7 +182,7 @@ def find_islands(scene: Scene, S: Stepping) -> None:
 @jitable
 def count_calm(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> bool:
     """Count the steps in which each body was still; return whether one was for long enough."""
-    some, slow = False, left_of(S, h)
+    some = False
     for k in range(bodies_awake(scene)):
         b = body_awake(scene, k)
         row = S.rest.body[b]
@@ -190,6 +190,7 @@ def count_calm(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> bool:
             continue
         at, length = BODY_SIZE * b, scene.scales.length[scene.scales.group[b]]
         speed = norm(vector(y, at + AT_V)) + length * norm(vector(y, at + AT_W))
+        slow = left_of(S, S.plan.connected[b], h)
         still = speed <= slow and S.plan.group[b] < 0 and not is_loaded(scene, b)
         if not still:
             row[CALM_STEPS] = 0
@@ -204,7 +205,7 @@ def count_calm(scene: Scene, S: Stepping, t: float, h: float, y: F1) -> bool:
 @jitable
 def is_calm(S: Stepping, b: int, t: float) -> bool:
     """Return whether a body was still for long enough."""
-    long = t - S.rest.since[b] >= LONG * S.plan.number[OWN_TIME]
+    long = t - S.rest.since[b] >= LONG * S.plan.scale[S.plan.connected[b], OWN_TIME]
     return S.rest.body[b, CALM_STEPS] >= CALM and long
 
 

@@ -22,7 +22,13 @@ from mbsim.core.arrays import F2, I1
 from mbsim.core.jitable import jitable
 from mbsim.fclib.bodies.solve import solve_contacts
 from mbsim.stepping.arrays import ALONG, W_NN, W_XX, W_ZZ, Motion, Points
-from mbsim.stepping.one_point import apply, apply_farther, fill_directions, solve_point, velocity_of
+from mbsim.stepping.one_point import (
+    apply,
+    apply_farther,
+    fill_directions,
+    solve_point,
+    velocity_of,
+)
 
 #: Sweeps before Newton's method of up to `FEW_POINTS` points, and of more points and behind it, at
 #: most. An iteration of Newton's method takes as long as tens of sweeps: stacks want few of them,
@@ -126,11 +132,11 @@ def sweep(p: Points, M: Motion, count: int, number: int) -> tuple[float, float]:
 
 
 @jitable
-def let_jumps_count(p: Points, M: Motion, count: int, allowed: float, part: float) -> None:
+def let_jumps_count(p: Points, M: Motion, count: int, sharp: float, part: float) -> None:
     """Let that part of what a step changes of a body's velocity be left at its points.
 
-    Never less than `allowed`, nor more than MOST_LEFT times that. An impact is taken by the step,
-    which is off by far more.
+    Never less than `sharp` of what may be left, nor more than MOST_LEFT times that. An impact is
+    taken by the step, which is off by far more.
     """
     for k in range(count):
         i, j = p.body[k, 0], p.body[k, 1]
@@ -140,6 +146,7 @@ def let_jumps_count(p: Points, M: Motion, count: int, allowed: float, part: floa
             for c in range(3):
                 square += (M.v[b, c] - M.before[b, c]) ** 2
             most = max(most, square)
+        allowed = sharp * p.least[k]
         p.counts[k] = 1.0 / min(max(allowed, part * math.sqrt(most)), MOST_LEFT * allowed)
 
 
@@ -183,11 +190,12 @@ def go_on(p: Points, M: Motion, count: int, part: float, number: int) -> None:
 
 @jitable
 def sweep_on(
-    p: Points, M: Motion, count: int, allowed: tuple[float, float], most: int
+    p: Points, M: Motion, count: int, may: tuple[float, float], most: int
 ) -> tuple[float, int, bool]:
     """Improve r and v of `count` points; return what a sweep still changes, sweeps, if solved.
 
-    That is of a velocity, over what may be left of it: `allowed` and a part of jumps. Sweeps end
+    That is of a velocity, over what may be left of it, `least` of its point: `may` is a factor of
+    that, and the part of jumps. Sweeps end
     where one of all pairs changes less than 1 in the square mean over what presses, and nowhere
     more than `WORST`; or with `most`. Between them
     impulses go on along the way of the sweeps before, as conjugate gradients do, which is dropped
@@ -197,7 +205,7 @@ def sweep_on(
     """
     left, before, sweeps, whole, solved = 0.0, 0.0, 0, True, True
     for k in range(count):
-        p.counts[k] = 1.0 / allowed[0]
+        p.counts[k] = 1.0 / (may[0] * p.least[k])
         for a in range(3):
             p.old[k, a] = p.r[k, a]
     change_all(p, M.changed, count, 0)
@@ -205,7 +213,7 @@ def sweep_on(
         sweeps += 1
         left, mean = sweep(p, M, count, sweeps)
         if sweeps % LOOKS == 1 and left > 1.0:
-            let_jumps_count(p, M, count, allowed[0], allowed[1])
+            let_jumps_count(p, M, count, may[0], may[1])
         solved = left <= 1.0 or (left <= WORST and mean <= 1.0)
         if (solved and whole) or sweeps == most or not math.isfinite(left):
             break
@@ -235,7 +243,7 @@ def list_closed(p: Points, M: Motion, count: int) -> I1:
 
 
 @jitable
-def finish(p: Points, M: Motion, ground: int, closed: I1, allowed: float) -> int:
+def finish(p: Points, M: Motion, ground: int, closed: I1, sharp: float) -> int:
     """Let Newton's method go on from r, and fill v by what it finds; return its iterations.
 
     It works on the same arrays (`fclib.bodies`), on the points that are `closed`.
@@ -243,9 +251,10 @@ def finish(p: Points, M: Motion, ground: int, closed: I1, allowed: float) -> int
     count = len(closed)
     bodies, w = np.empty((count, 2), dtype=np.int64), np.empty((count, 3))
     H, mu, r = np.zeros((count, 2, 3, 6)), np.empty(count), np.empty((count, 3))
-    size = 0.0
+    size, allowed = 0.0, math.inf
     for row in range(count):
         k = closed[row]
+        allowed = min(allowed, sharp * p.least[k])
         i, j = p.body[k, 0], p.body[k, 1]
         bodies[row, 0], bodies[row, 1] = (-1 if i == ground else i), (-1 if j == ground else j)
         fill_directions(p, k, ground, H[row])
@@ -289,7 +298,7 @@ def some_wide(p: Points, count: int) -> bool:
 
 @jitable
 def solve_points(
-    p: Points, M: Motion, ground: int, count: int, allowed: tuple[float, float]
+    p: Points, M: Motion, ground: int, count: int, may: tuple[float, float]
 ) -> tuple[float, int, int, bool]:
     """Solve `count` points; return what a sweep still changes, sweeps, Newtons, if it is solved.
 
@@ -297,7 +306,7 @@ def solve_points(
     where little changed; Newton's method does what they leave, and sweeps what it leaves.
     """
     most = FEW_SWEEPS if count <= FEW_POINTS else MOST_SWEEPS
-    left, sweeps, solved = sweep_on(p, M, count, allowed, most)
+    left, sweeps, solved = sweep_on(p, M, count, may, most)
     if solved:
         return left, sweeps, 0, solved
     newtons = 0
@@ -306,8 +315,8 @@ def solve_points(
     elif not some_wide(p, count):
         closed = list_closed(p, M, count)
         if 0 < len(closed) <= NEWTON_POINTS:
-            newtons = finish(p, M, ground, closed, allowed[0])
-    left, more, solved = sweep_on(p, M, count, allowed, MOST_SWEEPS)
+            newtons = finish(p, M, ground, closed, may[0])
+    left, more, solved = sweep_on(p, M, count, may, MOST_SWEEPS)
     if not math.isfinite(left):
         begin_anew(p, M, count)
         change_all(p, M.changed, count, 0)
@@ -328,13 +337,13 @@ def move_farther(p: Points, M: Motion, count: int) -> None:
 
 
 @jitable
-def project_positions(p: Points, shift: F2, count: int, h: float, most: float) -> int:
+def project_positions(p: Points, shift: F2, count: int, h: float) -> int:
     """Change displacements over h so that no point ends deeper than its slop; return the sweeps.
 
     The least change in the norm of the mass: gap + h H_n shift >= 0 without friction, pushes start
-    at 0. Where nothing ends so deep nothing changes. What begins deeper than `most`, as a deck may
-    begin or a short step, comes out by no more than that: a jump in positions is no motion that a
-    shorter step would find.
+    at 0. Where nothing ends so deep nothing changes. What begins deeper than its group goes in the
+    step, as a deck may begin or a short step, comes out by no more than that: a jump in positions
+    is no motion that a shorter step would find.
     """
     for k in range(count):
         p.push[k] = 0.0
@@ -343,7 +352,7 @@ def project_positions(p: Points, shift: F2, count: int, h: float, most: float) -
         worst = 0.0
         for step in range(count):
             k = count - 1 - step if sweeps % 2 == 1 else step
-            gap = max(p.gap[k], -most) + h * velocity_of(p, k, 0, shift)
+            gap = max(p.gap[k], -h * p.speed[k]) + h * velocity_of(p, k, 0, shift)
             if gap >= -0.5 * p.slop[k] and p.push[k] == 0.0:
                 continue
             along = p.given[k, ALONG]

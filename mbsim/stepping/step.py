@@ -22,7 +22,12 @@ from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
-from mbsim.dynamics.bodies.awake import bodies_awake, body_awake, graphic_awake, graphics_awake
+from mbsim.dynamics.bodies.awake import (
+    bodies_awake,
+    body_awake,
+    graphic_awake,
+    graphics_awake,
+)
 from mbsim.dynamics.bodies.kinematics import place_bodies, place_graphics, plane_travel
 from mbsim.stepping.across import add_work_across, is_divided
 from mbsim.stepping.arrays import (
@@ -34,13 +39,15 @@ from mbsim.stepping.arrays import (
     HIT,
     KEPT_STICKS,
     LEFT_PART,
+    LENGTH,
+    MAY_BE_LEFT,
     NEWTONS,
     POINTS,
     PRESSING,
     PROJECTED,
-    PUSH_SPEED,
     RESIDUAL,
     SLOP,
+    SPEED,
     STEP_LENGTH,
     STIFFNESS,
     THETA,
@@ -63,11 +70,9 @@ from mbsim.stepping.friction import (
     coefficient,
     keep_loads,
     left_near_yield,
-    left_of,
     let_jam,
     let_stick,
     let_yield,
-    noise_of,
 )
 from mbsim.stepping.held import begin_answers
 from mbsim.stepping.impacts import is_held, let_meet, look_ahead, postpone
@@ -78,6 +83,7 @@ from mbsim.stepping.one_point import apply, fill_drift, velocity_of
 from mbsim.stepping.pairs import find_missed, find_points
 from mbsim.stepping.points import fill_answers, fill_point, fill_reach, way_at
 from mbsim.stepping.rebound import limit_rebound
+from mbsim.stepping.scales import group_at, left_of, noise_of
 from mbsim.stepping.sleep import wake_loaded
 from mbsim.stepping.solver import move_farther, project_positions, solve_points
 
@@ -155,7 +161,9 @@ def prepare_points(scene: Scene, S: Stepping, h: float) -> int:
     for k in range(count):
         x, z = velocity_of(P, k, 1, M.before), velocity_of(P, k, 2, M.before)
         slip, row = math.sqrt(x * x + z * z), P.was[k]
-        if row >= 0 and slip <= noise_of(S, h):
+        g = group_at(S, k)
+        P.speed[k], P.least[k] = S.plan.scale[g, SPEED], left_of(S, g, h)
+        if row >= 0 and slip <= noise_of(S, g, h):
             # what stuck moves by what the solver left of it
             slip = 0.0 if S.kept.table[row, KEPT_STICKS] == 1.0 else slip
         P.holds[k] = coefficient(S, P.contact[k], slip)
@@ -177,7 +185,7 @@ def start_impulses(scene: Scene, S: Stepping, h: float) -> None:
         if P.r[k, 0] > 0.0:
             r = (P.r[k, 0], P.r[k, 1], P.r[k, 2])
             apply(P, k, M.v, r)
-        if P.was[k] < 0 and P.gap[k] <= S.plan.number[SLOP]:
+        if P.was[k] < 0 and P.gap[k] <= S.plan.scale[group_at(S, k), SLOP]:
             # what holds there is not known yet
             M.changed[P.body[k, 0]] = M.changed[P.body[k, 1]] = 1
     M.changed[ground] = 0
@@ -195,13 +203,14 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
     P, M, tally = S.points, S.motion, S.tally
     count, nb = tally.count[POINTS], len(scene.bodies.mass)
     start_impulses(scene, S, h)
-    slop = S.plan.number[SLOP]
-    allowed = left_of(S, h)
-    left, sweeps, part, solved = 0.0, 0, S.plan.number[LEFT_PART], True
+    # `sharp`: part of what the solver may leave; `most`: the largest of that
+    sharp, part, most = 1.0, S.plan.number[LEFT_PART], 0.0
+    left, sweeps, solved = 0.0, 0, True
     for k in range(count):
         P.mu[k] = P.holds[k]
+        most = max(most, P.least[k])
     for attempt in range(MOST_YIELDS + 1 if count > 0 else 0):
-        left, more, newtons, solved = solve_points(P, M, nb, count, (allowed, part))
+        left, more, newtons, solved = solve_points(P, M, nb, count, (sharp, part))
         sweeps += more
         tally.count[NEWTONS] += newtons
         if not math.isfinite(left):
@@ -210,32 +219,34 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
             # what yields or meets by now does so in the next step: impulses are those of the law
             # as it was when they were solved
             break
-        if not solved and let_jam(S, count, h, allowed):
+        if not solved and let_jam(S, count, h, sharp):
             continue
         near = left_near_yield(S, count)
-        if near < 0.5 * allowed:
+        if near < 0.5 * sharp:
             # not for what is less by rounding alone: tries are few
-            allowed = near
+            sharp = near
             continue
         changed = let_meet(S, count, h)
         changed = postpone(S, count, h) or changed
-        changed = let_stick(S, count, noise_of(S, h)) or changed
-        noise = noise_of(S, h) * allowed / left_of(S, h)
-        if not let_yield(S, count, noise) and not changed:
+        changed = let_stick(S, count, h) or changed
+        if not let_yield(S, count, h, sharp) and not changed:
             break
-    more_left, more, newtons = limit_rebound(scene, S, count, h, (allowed, part))
+    more_left, more, newtons = limit_rebound(scene, S, count, h, (sharp, part))
     if not math.isfinite(more_left):
         return Code.NOT_FINITE
     left = max(left, more_left)
     move_farther(P, M, count)
     sweeps += more
     tally.count[NEWTONS] += newtons
-    spread_parts(scene, S, count, h, slop)
+    spread_parts(scene, S, count, h)
     fill_shift(scene, S)
-    pushes = project_positions(P, M.shift, count, h, h * S.plan.number[PUSH_SPEED])
+    pushes = project_positions(P, M.shift, count, h)
     number = tally.number
     # of two halves that make one step the worse one counts
-    number[RESIDUAL] = left * allowed if committed else max(left * allowed, number[RESIDUAL])
+    left *= sharp * most
+    may = number[MAY_BE_LEFT]
+    if committed or may == 0.0 or left * may > number[RESIDUAL] * most:
+        number[RESIDUAL], number[MAY_BE_LEFT] = left, most
     number[STEP_LENGTH] = h
     hit = 1.0 if velocities_jump(scene, S) else 0.0
     number[HIT] = hit if committed else max(hit, number[HIT])
@@ -291,10 +302,11 @@ def has_settled(scene: Scene, S: Stepping, h: float) -> bool:
     """
     if not is_implicit(S):
         return True
-    M, most = S.motion, noise_of(S, h) / math.sqrt(h * S.forces.number[STIFFNESS] + 1e-300)
+    M, root = S.motion, math.sqrt(h * S.forces.number[STIFFNESS] + 1e-300)
     for k in range(bodies_awake(scene)):
         b = body_awake(scene, k)
-        length = scene.scales.length[scene.scales.group[b]]
+        g = S.plan.connected[b]
+        length, most = S.plan.scale[g, LENGTH], noise_of(S, g, h) / root
         for c in range(6):
             off = abs(M.v[b, c] - M.guess[b, c])
             if (off if c < 3 else off * length) > most:

@@ -1,0 +1,39 @@
+"""By what velocities and lengths of a step are judged: those of the group of connected bodies.
+
+What else there is in a model, however large or fast, changes nothing of them
+(`compile_model.groups`).
+"""
+
+from __future__ import annotations
+
+from mbsim.core.jitable import jitable
+from mbsim.stepping.arrays import LEFT, LEFT_SPEED, NOISE, Stepping
+
+#: Closing and slipping are none up to so many times what the solver may leave of a velocity at
+#: most, however short a step.
+NOISE_OF_SPEED = 30.0
+
+
+@jitable
+def group_at(S: Stepping, k: int) -> int:
+    """Return the group of connected bodies that point k is of."""
+    i, j = S.points.body[k, 0], S.points.body[k, 1]
+    return S.plan.connected[i if i != len(S.plan.connected) - 1 else j]
+
+
+@jitable
+def left_of(S: Stepping, g: int, h: float) -> float:
+    """Return what the solver may leave of a velocity of group g in a step h.
+
+    What it moves in the step does not count then; nor, over the group's own time, what is left of a
+    velocity behind an impact in a step that is very short.
+    """
+    scale = S.plan.scale[g]
+    return min(scale[LEFT] / h, scale[LEFT_SPEED])
+
+
+@jitable
+def noise_of(S: Stepping, g: int, h: float) -> float:
+    """Return the speed up to which closing and slipping of group g in a step h are none."""
+    scale = S.plan.scale[g]
+    return min(scale[NOISE] / h, NOISE_OF_SPEED * scale[LEFT_SPEED])
