@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, SupportsFloat
 
@@ -366,8 +366,23 @@ def settle(
     notes += said_of_friction
     if awake and method != RIGID:
         notes.append(f"Param_Transient sleep: is for MOREAU; nothing sleeps with {method}")
+    notes += _late_sensors(model, stages)
     settings = Settings(tuple(stages), method, (*notes, *said_of_names))
     return replace(settings, notes=(*settings.notes, f"tol {settings.tolerances}"))
+
+
+def _late_sensors(model: Model, stages: Sequence[Stage]) -> list[str]:
+    """Return a note on the sensors that act at the end of a step, where steps may be long."""
+    late = [sensor for sensor in model.sensors.values() if not sensor.zero_crossing]
+    if not late or all(math.isfinite(stage.h_max) for stage in stages if stage.takes_time):
+        return []
+    name = element_name(model.file, "Sensor_Event", late[0].id)
+    others = f" and {len(late) - 1} more" if len(late) > 1 else ""
+    crossing = "BISECTION" if is_adams(model.file) else 'zero_crossing="TRUE"'
+    return [
+        f"{name}{others}: acts at the end of the step that finds it true, and steps may be long; "
+        f"{crossing} ends a step there, h_max bounds them"
+    ]
 
 
 def tightened(settings: Settings, tighter: float, least_steps: float, h_most: float) -> Settings:

@@ -95,3 +95,20 @@ def test_a_word_of_an_adams_deck_is_told_too(tmp_path):
     deck.write_text("title\nPART/1, GROUND\nMOTION/1, ROTATIONAL, JOINT=1, FUNCTION=TIME\nEND\n")
     with pytest.raises(DeckError, match="ROTATIONAL: unknown word; did you mean ROTATION"):
         read_model(deck)
+
+
+@pytest.mark.parametrize(
+    ("sensor", "transient", "noted"),
+    [
+        ("", "", True),
+        ('zero_crossing="FALSE"', "", True),
+        ('zero_crossing="TRUE"', "", False),
+        ("", '<Param_Transient h_max="0.01"/>', False),
+    ],
+)
+def test_a_sensor_that_may_act_late_is_noted(tmp_path, sensor, transient, noted):
+    body = f'<Body_Rigid id="2" cg_id="20" mass="1" {INERTIA}/>'
+    body += f'<Sensor_Event id="7" expr="DZ(20)" compare="LE" value="-1" halt="TRUE" {sensor}/>'
+    model = read(tmp_path, body, transient + '<Simulate end_time="1" print_interval="1"/>')
+    said = "Sensor_Event[7]: acts at the end of the step that finds it true"
+    assert any(note.startswith(said) for note in settle(model).notes) == noted
