@@ -191,6 +191,8 @@ def _tolerance(model: Model, simulation: Simulation, tol: float | None) -> tuple
 def _asked_method(model: Model, sources: Any, integrator: str | None) -> tuple[str, str]:
     """Return the name of the method for one Simulate, and where it was said."""
     if integrator:
+        if not isinstance(integrator, str):
+            raise ModelError(f"integrator={integrator!r} is not allowed: the name of a method")
         return integrator.upper(), "integrator"
     for source in sources:
         if source is not None and source.integrator_type:

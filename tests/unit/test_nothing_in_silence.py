@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mbsim.errors import DeckError
+from mbsim.errors import DeckError, ModelError
 from mbsim.model.elements import Model
 from mbsim.model.placement import place
 from mbsim.reader.keywords import nearest
@@ -112,3 +112,10 @@ def test_a_sensor_that_may_act_late_is_noted(tmp_path, sensor, transient, noted)
     model = read(tmp_path, body, transient + '<Simulate end_time="1" print_interval="1"/>')
     said = "Sensor_Event[7]: acts at the end of the step that finds it true"
     assert any(note.startswith(said) for note in settle(model).notes) == noted
+
+
+def test_a_method_that_is_no_name_is_refused(tmp_path):
+    body = f'<Body_Rigid id="2" cg_id="20" mass="1" {INERTIA}/>'
+    model = read(tmp_path, body, '<Simulate end_time="1" print_interval="1"/>')
+    with pytest.raises(ModelError, match="integrator=5 is not allowed: the name of a method"):
+        settle(model, integrator=5)
