@@ -174,7 +174,7 @@ class Timetable:
         scene, self.run = system.scene, (span, estimates)
         self.shortest = shortest
         found, blind = functions(scene, tol if estimates else 0.1 * tol)
-        self.looks = blind or _asks_time(system)
+        self.looks = blind or asks_time(system)
         self.tol, self.samples = tol, samples
         groups: dict[Any, list[Function]] = {}
         curves: dict[tuple[int, ...], Any] = {}
@@ -343,7 +343,7 @@ def follows_time(scene: Scene) -> bool:
     return bool(np.any(scene.programs.code[:, CODE_OPERATION] == TIME))
 
 
-def _asks_time(system: System) -> bool:
+def asks_time(system: System) -> bool:
     """Return whether a user's function may look at the time."""
     if any(name[0] != STATEMENT and user.acts for name, user in system.subroutines.items()):
         return True

@@ -48,7 +48,9 @@ COLLIDES = 33
 JUMPS = 34
 # whether something follows time, so that it may jump
 TIMED = 35
-WORDS = 36
+# whether a user's function may look at the time
+ASKS_TIME = 36
+WORDS = 37
 #: Rows of `Variations.far` and `depth`: either side of a difference, and the run itself.
 UP_SIDE, DOWN_SIDE, OWN = range(3)
 #: Rows of `Variations.jump`: y before the commit, f before and behind it; y and f of the straight

@@ -33,6 +33,7 @@ from mbsim.sensitivity.along import is_too_much, project_end, remember_end, valu
 from mbsim.sensitivity.arrays import (
     ALONG,
     ASKED,
+    ASKS_TIME,
     ATTEMPT,
     BEFORE,
     BENT,
@@ -87,7 +88,7 @@ from mbsim.sensitivity.generalised import generalised_step, note_along
 from mbsim.sensitivity.implicit import implicit_step
 from mbsim.sensitivity.later import UNKNOWN, add, add_motion, give_up, go_on, is_steady, pays
 from mbsim.sensitivity.reintegration import hold, make_sure
-from mbsim.sensitivity.timed import begin_unseen, clear_time, look_behind, make_room
+from mbsim.sensitivity.timed import begin_unseen, clear_time, find_hidden, look_behind, make_room
 from mbsim.sensitivity.twin import half_step, is_deep, keep_unit, one_side, reach_of, set_parameter
 
 #: Where the packed `Variations` stand: where those of MOREAU would, which takes no part in this.
@@ -299,6 +300,39 @@ def rhs_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     return code
 
 
+@jitable
+def take_over(V: Variations, t: float, n: int, anew: bool, hops: bool) -> None:
+    """Let what was found at the end of a step be committed; `reason` says what is not known."""
+    for k in range(len(V.size)):
+        if anew:
+            V.smooth[k] = V.ready[k] = 0
+        for s in range(V.memory.shape[1]):
+            for j in range(V.memory.shape[2]):
+                V.before[k, s, j], V.memory[k, s, j] = V.memory[k, s, j], V.end[k, s, j]
+        V.shown[k, SHOWN_AT], V.shown[k, SHOWN_LATER] = 0.0, V.later[k, LAST_UNTIL]
+        for i in range(n):
+            V.kept[k, i] = V.d[k, i]
+            V.d[k, i] = V.next[k, i]
+            if hops:
+                V.d[k, i] += V.fall[k, i]
+            if not abs(V.d[k, i]) * V.size[k] <= LARGEST * V.scale[i]:
+                V.reason[k] = LOST_LARGE
+        if hops and not math.isfinite(V.fall[k, 0]):
+            V.reason[k] = LOST_JUMP
+        if V.reason[k] != 0.0:
+            lose_behind(V, k, t, int(V.reason[k]))
+
+
+@jitable
+def lose_hidden(V: Variations, scene: Scene, m: Method, t: float, h: float) -> None:
+    """Lose derivatives by what moves a jump in the step that only a user's function knows of."""
+    find_hidden(V, scene, m, t)
+    for k in range(len(V.size)):
+        if V.reason[k] != 0.0:
+            lose(V, k, t - h, LOST_JUMP)
+            V.reason[k] = 0.0
+
+
 def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     """What follows from a step that is taken, and its derivatives."""
     scene = view(context, Scene)
@@ -317,6 +351,8 @@ def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int
     V.shift[:] = math.nan
     list_asking(V, scene, switched)
     V.reason[:] = 0.0
+    if V.words[ASKS_TIME] == 1:
+        lose_hidden(V, scene, m, t, h)
     hops = V.words[TIMED] == 1 and look_for_jumps(V, scene, m, t)
     take_step(V, scene, m, t - h, h)
     make_sure(V, scene, m, t, switched)
@@ -328,24 +364,7 @@ def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int
     if word >= 0 and (switched or word & (Taken.Y_CHANGED + Taken.BEGIN_ANEW)):
         cross(V, scene, t, y, switched)
     anew = hops or word & (Taken.Y_CHANGED + Taken.BEGIN_ANEW) != 0
-    for k in range(len(V.size)):
-        if switched or anew:
-            V.smooth[k] = V.ready[k] = 0
-        for s in range(V.memory.shape[1]):
-            for j in range(V.memory.shape[2]):
-                V.before[k, s, j], V.memory[k, s, j] = V.memory[k, s, j], V.end[k, s, j]
-        V.shown[k, SHOWN_AT], V.shown[k, SHOWN_LATER] = 0.0, V.later[k, LAST_UNTIL]
-        for i in range(n):
-            V.kept[k, i] = V.d[k, i]
-            V.d[k, i] = V.next[k, i]
-            if hops:
-                V.d[k, i] += V.fall[k, i]
-            if not abs(V.d[k, i]) * V.size[k] <= LARGEST * V.scale[i]:
-                V.reason[k] = LOST_LARGE
-        if hops and not math.isfinite(V.fall[k, 0]):
-            V.reason[k] = LOST_JUMP
-        if V.reason[k] != 0.0:
-            lose_behind(V, k, t, int(V.reason[k]))
+    take_over(V, t, n, switched or anew, hops)
     hold(V, scene, t, y, switched or anew or V.words[CHANGES] > 0)
     return word
 

@@ -120,7 +120,7 @@ class Sensitivities:
         worth: int = 0,
         start: float = 0.0,
     ) -> None:
-        from mbsim.compile_model.timetable import follows_time
+        from mbsim.compile_model.timetable import asks_time, follows_time
 
         self.system, self.directions, self._tol = system, list(directions), tol
         self.twin = twin_of(system, directions)
@@ -131,6 +131,7 @@ class Sensitivities:
         starts = [self._start(direction, assemble, own) for direction in self.directions]
         self.arrays = self._arrays(y, np.array(starts), tol)
         self.arrays.words[at.WORTH] = worth
+        self.arrays.words[at.ASKS_TIME] = int(asks_time(system))
         self.arrays.words[at.TIMED] = int(follows_time(system.scene))
         self.arrays.gap[at.LAST], self.arrays.gap[at.UNTIL] = -math.inf, start
         self._pack()

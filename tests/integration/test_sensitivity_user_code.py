@@ -129,3 +129,30 @@ def test_numbers_that_are_not_known_are_said_to_be_none(tmp_path):
             mbsim.simulate(file, sensitivity=[name])
     run = mbsim.simulate(file, overrides={"Force_Vector_TwoBody[5].usrsub_param_string[1]": 0.0})
     assert abs(run["bodies/2/velocity/x"][1] - 2.0) < 1e-6
+
+
+CLOCK = """
+def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):
+    v = (xdot[0] ** 2 + xdot[1] ** 2 + 1e-4) ** 0.5
+    mu = par[0]
+    if time > par[1]:
+        mu = par[2]
+    return [-mu * nforce * xdot[0] / v, -mu * nforce * xdot[1] / v, 0.0]
+"""
+
+
+@pytest.mark.parametrize("integrator", ["DOPRI5", "DOP853", "RADAU5", "GALPHA"])
+def test_a_time_that_a_users_law_keeps_to_itself(integrator, tmp_path):
+    (tmp_path / "laws.py").write_text(CLOCK)
+    file = tmp_path / "ball.xml"
+    law = IMPACT + ' script_name="laws.py"' + FRICTION.replace("0.3,0.01", "0.1,0.2987,0.05")
+    low = BALL.format(law=law, more="").replace('pos_z="0.2"', 'pos_z="0.107"')
+    file.write_text(low)
+    moved, other = (f"Force_Contact[301].cff_param_string[{k}]" for k in (2, 3))
+    run = mbsim.simulate(file, integrator=integrator, tol=1e-8, sensitivity=[moved, other])
+    # which of its times the force jumps at nothing tells but the force itself
+    assert "jump" in run.parameters[moved]["why"]
+    assert np.isnan(run.sensitivity(SIGNAL, moved)[run["time"] > 0.3]).all()
+    # one that moves no jump is known
+    assert run.parameters[other]["known_until"] == math.inf
+    assert (run.sensitivity("bodies/2/velocity/x", other)[run["time"] > 0.31] < -1e-3).all()
