@@ -22,7 +22,16 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import dot, norm, sub, vector
 from mbsim.dynamics.bodies.kinematics import place_graphics
 from mbsim.dynamics.contact.forces import IGNORE_DEEPER, sides, velocity_at
-from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, COUPLE, axis
+from mbsim.geometry.catalog import (
+    AT_DEPTH,
+    AT_NORMAL,
+    AT_POINT,
+    COUPLE,
+    LEAN_X,
+    LEAN_Y,
+    REGION_ROWS,
+    axis,
+)
 
 
 @jitable
@@ -55,7 +64,13 @@ def measure_pair(scene: Scene, pair: int) -> bool:
     if count < 0 and acts and work.beyond[c] == 0:
         work.beyond[c] = 1 + pair
     if kinds.swapped[kind] == 1:
+        patches = kinds.step[kind] == REGION_ROWS
         for s in range(first, first + kinds.slots[kind]):
+            if patches and (s - first) % REGION_ROWS == 1:
+                # numbers in place of a point: I tilts the other way, all else is as it was
+                work.points[s, LEAN_X] = -work.points[s, LEAN_X]
+                work.points[s, LEAN_Y] = -work.points[s, LEAN_Y]
+                continue
             for k in range(3):
                 work.points[s, AT_NORMAL + k] = -work.points[s, AT_NORMAL + k]
                 work.points[s, COUPLE + k] = -work.points[s, COUPLE + k]
