@@ -8,9 +8,9 @@ from enum import IntEnum
 
 import numpy as np
 
+from mbsim.compile_model.kept_surfaces import kept_surface
 from mbsim.compile_model.pairing import Plans, shape_class
 from mbsim.model.elements import Array, Graphic, Model
-from mbsim.model.flat_parts import fewer_triangles
 from mbsim.model.surface import (
     AT_TRIANGLES,
     CORNER_NORMAL,
@@ -19,7 +19,6 @@ from mbsim.model.surface import (
     TRIANGLE,
     TRIANGLES,
     UNIT,
-    pack,
 )
 from mbsim.model.tessellation import triangles_of
 
@@ -78,13 +77,9 @@ def _by_class(model: Model, ids: Sequence[int]) -> dict[str, list[int]]:
 
 
 def packed(graphic: Graphic, layered: bool) -> Array:
-    """Return a graphic as a packed surface (`model.surface`)."""
-    vertices, faces = fewer_triangles(*triangles_of(graphic))
-    if not layered:
-        return pack(vertices, faces)
-    from mbsim.model.surface_layer import layer
-
-    return pack(vertices, faces, *layer(vertices, faces))
+    """Return a graphic as a packed surface (`model.surface`), to be written to."""
+    found: Array = kept_surface(*triangles_of(graphic), layered).copy()
+    return found
 
 
 def thickness(surface: Array, need: Need) -> float:
@@ -108,11 +103,14 @@ def thickness(surface: Array, need: Need) -> float:
     least = math.inf
     for p, n in zip(corners[begins].mean(axis=1), unit[begins], strict=True):
         slope = -unit @ n
-        out = slope > SQUARE
+        out = np.flatnonzero(slope > SQUARE)
+        way = ((corners[out, 0] - p) * unit[out]).sum(axis=1) / slope[out]
+        # those that are farther than what was found are not looked at
+        near = (way > 0.0) & (way < least)
+        out, way = out[near], way[near]
         first, second, third = corners[out].swapaxes(0, 1)
-        way = ((first - p) * unit[out]).sum(axis=1) / slope[out]
         x = p - way[:, None] * n
-        hit = way > 0.0
+        hit = np.ones(len(way), dtype=bool)
         for begin, end in ((first, second), (second, third), (third, first)):
             hit &= (np.cross(end - begin, x - begin) * unit[out]).sum(axis=1) >= 0.0
         least = min(least, float(way[hit].min(initial=math.inf)))

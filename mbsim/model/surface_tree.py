@@ -36,22 +36,42 @@ def level_bounds(starts: Indices, levels: int, level: int) -> Indices:
     return bounds
 
 
+def _by_component(points: Array) -> Array:
+    """Return points (m, k, 3) with their components first and their triangles last, (3, k, m).
+
+    Sums and bounds over corners are then sums and bounds of whole rows.
+    """
+    return np.ascontiguousarray(points.transpose(2, 1, 0))
+
+
+def _turned(axes: Array, part: Indices, points: Array) -> Array:
+    """Return points (3, k, m) along the axes (n, 3, 3), by rows, of the node of each triangle."""
+    a = np.take(axes.transpose(1, 2, 0), part, axis=2)
+    x, y, z = points
+    found: Array = np.stack([a[i, 0] * x + a[i, 1] * y + a[i, 2] * z for i in range(3)])
+    return found
+
+
 def _node_axes(corners: Array, starts: Indices, part: Indices) -> Array:
-    """Return the axes of spread (k, 3, 3) of what nodes hold, by rows."""
-    many = 3.0 * np.bincount(part)[:, None]
-    mean = np.add.reduceat(corners.sum(axis=1), starts, axis=0) / many
-    off = corners - mean[part][:, None]
-    spread = np.add.reduceat(np.einsum("tki,tkj->tij", off, off), starts, axis=0)
+    """Return the axes of spread (k, 3, 3) of what nodes hold, by rows; corners (3, 3, m)."""
+    many = 3.0 * np.bincount(part)
+    mean = np.add.reduceat(corners.sum(axis=1), starts, axis=1) / many
+    off = corners - mean[:, None, part]
+    spread = np.empty((len(many), 3, 3))
+    for i in range(3):
+        for j in range(i, 3):
+            total = np.add.reduceat((off[i] * off[j]).sum(axis=0), starts)
+            spread[:, i, j] = spread[:, j, i] = total
     axes: Array = np.linalg.eigh(spread)[1].transpose(0, 2, 1)
     return axes
 
 
 def _areas_up_to(low: Array, high: Array, part: Indices) -> Array:
-    """Return half the areas of the boxes of each triangle and those before it in its node."""
+    """Return half the areas of the boxes (3, m) of triangles and those before in their nodes."""
     # shifted by more than all extents, one node's bounds say nothing in the next
-    shift = (part * (2.0 * float((high.max(axis=0) - low.min(axis=0)).max())))[:, None]
-    below = np.minimum.accumulate(low - shift, axis=0) + shift
-    x, y, z = (np.maximum.accumulate(high + shift, axis=0) - shift - below).T
+    shift = part * (2.0 * float((high.max(axis=1) - low.min(axis=1)).max()))
+    below = np.minimum.accumulate(low - shift, axis=1) + shift
+    x, y, z = np.maximum.accumulate(high + shift, axis=1) - shift - below
     area: Array = x * y + y * z + z * x
     return area
 
@@ -78,7 +98,7 @@ def _best_cuts(
     first = np.arange(len(part)) - starts[part] + 1
     rest = count[part] - first
     before = _areas_up_to(low, high, part)
-    after = _areas_up_to(low[::-1], high[::-1], part[-1] - part[::-1])[::-1]
+    after = _areas_up_to(low[:, ::-1], high[:, ::-1], part[-1] - part[::-1])[::-1]
     cost = before * first
     cost[:-1] += after[1:] * rest[:-1]
     larger = np.maximum(first, rest)
@@ -110,22 +130,26 @@ def oriented_order(
     normals (the sides of a plate part so), where number times area of the boxes is least.
     """
     order: Indices = np.arange(len(corners))
+    points, below = _by_component(corners), _by_component(inner)
+    normals = np.ascontiguousarray(units.T)[:, None]
     bounds: Indices = np.array([0, len(corners)])
     for level in range(levels):
         held = np.flatnonzero(np.diff(bounds))
         starts = bounds[held]
         part = np.repeat(np.arange(len(held)), np.diff(bounds)[held])
-        here = corners[order]
-        axes = _node_axes(here, starts, part)[part]
-        own = np.einsum("tij,tkj->tki", axes, np.concatenate([here, inner[order]], axis=1))
-        low, high = own.min(axis=1), own.max(axis=1)
-        keys = np.hstack([own[:, :3].mean(axis=1), np.einsum("tij,tj->ti", axes, units[order])])
+        here = points[:, :, order]
+        axes = _node_axes(here, starts, part)
+        outer = _turned(axes, part, here)
+        under = _turned(axes, part, below[:, :, order])
+        low = np.minimum(outer.min(axis=1), under.min(axis=1))
+        high = np.maximum(outer.max(axis=1), under.max(axis=1))
+        keys = (*outer.mean(axis=1), *_turned(axes, part, normals[:, :, order])[:, 0])
         most = leaf * 2 ** (levels - level - 1)
         least, found = np.full(len(held), np.inf), order
         split = np.ones(len(held), dtype=np.int64)
-        for key in keys.T:
+        for key in keys:
             sorted_ = _sorted_within(key, starts, part)
-            cost, first = _best_cuts(low[sorted_], high[sorted_], starts, part, most)
+            cost, first = _best_cuts(low[:, sorted_], high[:, sorted_], starts, part, most)
             better = cost < least
             found = np.where(better[part], order[sorted_], found)
             split, least = np.where(better, first, split), np.minimum(cost, least)
@@ -138,6 +162,8 @@ def oriented_order(
 
 def _frames(corners: Array, units: Array, starts: Indices, part: Indices) -> list[Array]:
     """Return axes (k, 3, 3) that nodes may have: of spread, the mesh's own, upright on the side.
+
+    Corners are (3, 3, m), components first.
 
     The last have the mean normal and, in its plane, the mesh's axis that is nearest to that of
     most spread: a side of a prism is so boxed whatever triangles it is cut into.
@@ -159,16 +185,17 @@ def _frames(corners: Array, units: Array, starts: Indices, part: Indices) -> lis
 def _boxes_along(
     axes: Array, corners: Array, inner: Array, starts: Indices, part: Indices
 ) -> Array:
-    """Return the rows of nodes that have these axes."""
-    outer = np.einsum("tij,tkj->tki", axes[part], corners)
-    below = np.einsum("tij,tkj->tki", axes[part], inner)
-    room = ROOM * float(np.ptp(corners.reshape(-1, 3), axis=0).max())
-    both = np.concatenate([outer, below - room, below + room], axis=1)
+    """Return the rows of nodes that have these axes; corners and inner points (3, 3, m)."""
+    outer, below = _turned(axes, part, corners), _turned(axes, part, inner)
+    room = ROOM * float(np.ptp(corners.reshape(3, -1), axis=1).max())
+    low, high = outer.min(axis=1), outer.max(axis=1)
+    deep_low = np.minimum(low, below.min(axis=1) - room)
+    deep_high = np.maximum(high, below.max(axis=1) + room)
     made = np.empty((len(axes), ORIENTED))
     made[:, ROWS:THIN] = axes.reshape(-1, 9)
-    for at, points in ((THIN, outer), (DEEP, both)):
-        low = np.minimum.reduceat(points.min(axis=1), starts, axis=0)
-        high = np.maximum.reduceat(points.max(axis=1), starts, axis=0)
+    for at, least, most in ((THIN, low, high), (DEEP, deep_low, deep_high)):
+        low = np.minimum.reduceat(least, starts, axis=1).T
+        high = np.maximum.reduceat(most, starts, axis=1).T
         made[:, at : at + 3] = np.einsum("kij,ki->kj", axes, 0.5 * (low + high))
         made[:, at + 3 : at + 6] = 0.5 * (high - low)
     return made
@@ -184,14 +211,15 @@ def oriented_boxes(
     """
     made = np.zeros((2 ** (levels + 1), ORIENTED))
     made[:, [0, 4, 8]] = 1.0
+    points, below = _by_component(corners), _by_component(inner)
     made[:, THIN + 3 : DEEP] = made[:, DEEP + 3 : FIRST] = NOTHING
     for level in range(levels + 1):
         bounds = level_bounds(starts, levels, level)
         held = np.flatnonzero(np.diff(bounds))
         part = np.repeat(np.arange(len(held)), np.diff(bounds)[held])
         nodes, least = np.zeros((len(held), ORIENTED)), np.full(len(held), np.inf)
-        for axes in _frames(corners, units, bounds[held], part):
-            rows = _boxes_along(axes, corners, inner, bounds[held], part)
+        for axes in _frames(points, units, bounds[held], part):
+            rows = _boxes_along(axes, points, below, bounds[held], part)
             size = np.zeros(len(rows))
             for at in (THIN, DEEP):
                 x, y, z = rows[:, at + 3 : at + 6].T
