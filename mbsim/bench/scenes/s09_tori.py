@@ -11,8 +11,10 @@ from mbsim.bench import parameters as p
 from mbsim.bench.outcome import Outcome
 from mbsim.bench.scene import Scene, Target, Variation
 
-LAW = p.ImpactLaw(k=1e6, e=1.0, c=50.0, dmax=1e-4)
+#: Critical damping of 1 kg: contacts of the peers do not rebound either.
+LAW = p.ImpactLaw(k=1e6, e=1.0, c=2e3, dmax=1e-4)
 TRANSITION = 0.01  # m/s, of the smoothed friction
+STEPS = (1e-2, 5e-3, 2e-3)  # s, of rigid contact
 
 
 def _graphic(number: int, marker: int) -> str:
@@ -42,7 +44,11 @@ def _law() -> dict[str, object]:
 def _plane(variation: Variation) -> str:
     return text.deck(
         "A torus falls on a plane",
-        [*_falling(p.S9.tilt), text.contact(301, [200], [100], **_law())],
+        [
+            *_falling(p.S9.tilt),
+            text.contact(301, [200], [100], **_law()),
+            *text.fixed_step(variation),
+        ],
         p.S9.end_time,
     )
 
@@ -56,6 +62,7 @@ def _torus(variation: Variation) -> str:
             _graphic(110, 12),
             text.contact(301, [200], [100], **_law()),
             text.contact(302, [200], [110], **_law()),
+            *text.fixed_step(variation),
         ],
         p.S9.end_time,
     )
@@ -123,6 +130,7 @@ SCENES = (
         measure="z_error",
         unit="height of the centre over that of a torus that lies flat [m]",
         deck=_plane,
+        variations=({}, *({"h": h} for h in STEPS)),
         errors=_at_rest,
         targets=(Target(1 / 2),),
         pass_below=1e-4,
@@ -136,6 +144,7 @@ SCENES = (
         measure="passed_through",
         unit="rows in which one torus has passed through the other",
         deck=_torus,
+        variations=({}, *({"h": h} for h in STEPS)),
         errors=_on_torus,
         targets=(Target(1 / 2),),
         pass_below=0.5,
