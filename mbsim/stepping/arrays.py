@@ -130,12 +130,14 @@ class Motion(NamedTuple):
     inverse: F3  # (nb, 6, 6) of the mass
     before: F2  # (nb + 1, 6) velocity at the step's begin
     free: F2  # (nb + 1, 6) at its end, were there no contacts
+    flight: F2  # (nb + 1, 6) `free`, but `before` of bodies that others hold where they are
     v: F2  # (nb + 1, 6) with them
     guess: F2  # (nb, 6) as the last solution of the step had it, by which forces are
     full: F2  # (nb + 1, 6) with all rebound, see `rebound`
     work: F2  # (nb, 4) of contacts of the island of which a body is the first
     shift: F2  # (nb + 1, 6) displacement over the step's length
     changed: I1  # (nb + 1,) the sweep that changed a body's velocity last by what counts
+    stays: I1  # (nb + 1,) 1 of bodies that go no way in the step which counts; of ground
     part: F1  # (nb + 1,) of `before` in that, the rest being v's
     touch: F1  # (nb + 1,) part of the step at which a body first meets something that turns it
     spins: F1  # (nb,) kinetic energy of a spin as impulses make it, see `energy`
@@ -193,7 +195,7 @@ class Points(NamedTuple):
     slides: F1  # (m,) s of `one_point.slip_of` as found last, 0 for none
     ahead: F1  # (m,) u_n + ahead >= 0 where the point closes
     part: F1  # (m,) of the step before an impact with restitution
-    held: I1  # (m,) 1 where other points are taken to keep the bodies from that impact
+    held: I1  # (m,) whether others keep the bodies from that impact, see `impacts`
     closing: F1  # (m,) u_n before the step
     r: F2  # (m, 3)
     full: F2  # (m, 3) with all rebound, see `rebound`
@@ -370,12 +372,14 @@ def make(
         inverse=numbers(nb, 6, 6),
         before=numbers(nb + 1, 6),
         free=numbers(nb + 1, 6),
+        flight=numbers(nb + 1, 6),
         v=numbers(nb + 1, 6),
         guess=numbers(nb, 6),
         full=numbers(nb + 1, 6),
         work=numbers(nb, 4),
         shift=numbers(nb + 1, 6),
         changed=whole(nb + 1),
+        stays=whole(nb + 1),
         part=numbers(nb + 1),
         touch=numbers(nb + 1),
         spins=numbers(nb),

@@ -74,7 +74,7 @@ def start_parts(scene: Scene, S: Stepping, count: int, h: float) -> None:
             flies = PRESSED
             after = velocity_of(P, k, 0, M.v)
             if 0.5 * h * abs(after - P.closing[k]) > S.plan.scale[group_at(S, k), SLOP]:
-                free = velocity_of(P, k, 0, M.free)
+                free = velocity_of(P, k, 0, M.flight)
                 part, touch = 0.0, meets_at(P.gap[k], h, P.closing[k], free)
         for b in (i, j):
             M.part[b], M.touch[b] = min(M.part[b], part), min(M.touch[b], touch)
@@ -100,19 +100,53 @@ def take_least(S: Stepping, i: int, j: int) -> bool:
 
 
 @jitable
+def find_what_stays(scene: Scene, S: Stepping, h: float) -> None:
+    """Note the bodies that go no way which counts, whatever their part of the step is."""
+    M, plan = S.motion, S.plan
+    M.stays[len(S.rest.body)] = 1
+    for row in range(bodies_awake(scene)):
+        b = body_awake(scene, row)
+        length, most = scene.scales.length[scene.scales.group[b]], 0.0
+        for c in range(6):
+            way = h * max(abs(M.before[b, c]), abs(M.v[b, c]), abs(M.v[b, c] - M.before[b, c]))
+            most = max(most, way if c < 3 else way * length)
+        M.stays[b] = 1 if most <= plan.scale[plan.connected[b], SLOP] else 0
+
+
+@jitable
+def fill_flight(scene: Scene, S: Stepping, h: float) -> None:
+    """Fill what bodies do in the step until they meet.
+
+    Of what impulses as they stand hold where it is nothing changes: what flies at it is
+    accelerated against it by its own forces.
+    """
+    M, ground = S.motion, len(S.rest.body)
+    find_what_stays(scene, S, h)
+    for c in range(6):
+        M.flight[ground, c] = M.free[ground, c]
+    for row in range(bodies_awake(scene)):
+        b = body_awake(scene, row)
+        for c in range(6):
+            M.flight[b, c] = M.before[b, c] if M.stays[b] == 1 else M.free[b, c]
+
+
+@jitable
 def spread_parts(scene: Scene, S: Stepping, count: int, h: float) -> None:
     """Find the bodies that a contact stops in the step, all that press on them, and joints hold.
 
-    Between two bodies of different parts a contact that stays closed would open or go deeper.
+    Between two bodies of different parts a contact that stays closed would open or go deeper. What
+    stays where it is has no part of the way: what meets it flies there, and on, as if it was
+    ground.
     """
-    P, plan, ground = S.points, S.plan, len(S.rest.body)
+    P, plan, stays = S.points, S.plan, S.motion.stays
     start_parts(scene, S, count, h)
+    find_what_stays(scene, S, h)
     changed = True
     while changed:
         changed = False
         for k in range(count):
             i, j = P.body[k, 0], P.body[k, 1]
-            if P.r[k, 0] != 0.0 and i != ground and j != ground:
+            if P.r[k, 0] != 0.0 and stays[i] == 0 and stays[j] == 0:
                 changed = take_least(S, i, j) or changed
         for g in range(len(plan.first) - 1):
             first = plan.members[plan.first[g]]

@@ -135,13 +135,13 @@ def add_losses(scene: Scene, S: Stepping, new: F1) -> None:
         i, j = P.body[k, 0], P.body[k, 1]
         c, lost, across = P.contact[k], 0.0, 0.0
         note_grounded(scene, S, i, j)
-        # bodies that press on each other have one of both; what ground has is not of this point
-        b = i if i != ground else j
+        # bodies that press on each other have one of both; what stays, as ground, has none of it
+        b = j if i == ground or (M.stays[i] == 1 and j != ground) else i
         flies, later = M.flies[b], M.part[b] - 0.5
         for a in range(3):
             before = velocity_of(P, k, a, M.before)
             work = 0.5 * P.r[k, a] * (before + velocity_of(P, k, a, M.v))
-            more = later * P.r[k, a] * (velocity_of(P, k, a, M.free) - before)
+            more = later * P.r[k, a] * (velocity_of(P, k, a, M.flight) - before)
             if flies == FLIES:
                 work += more
             elif flies == LANDS:
@@ -149,8 +149,9 @@ def add_losses(scene: Scene, S: Stepping, new: F1) -> None:
             lost -= work
             across += work if a > 0 else 0.0
         if flies == LANDS:
-            lost += unmoved_once(scene, S, i) if i != ground else 0.0
-            lost += unmoved_once(scene, S, j) if j != ground else 0.0
+            for body in (i, j):
+                if body != ground and M.flies[body] == LANDS:
+                    lost += unmoved_once(scene, S, body)
         new[first + c] += lost
         if scene.audit.friction_at[c] >= 0:
             new[scene.audit.friction_at[c]] += across

@@ -21,6 +21,10 @@ from mbsim.stepping.scales import group_at, noise_of
 
 #: So near to a surface, over its group's length, what would meet it without rebound is held there.
 NEARLY = 0.01
+#: A point has landed if this part of its gap is left at most, or so many times what counts.
+SHORT_OF, MANY_SLOPS = 0.1, 10.0
+#: Of `Points.held`: other points keep its bodies from meeting; they meet at the step's end.
+HELD, LANDS = 1, 2
 #: A point that is let go of may close so many times faster than it does.
 LET_GO = 100.0
 
@@ -39,7 +43,7 @@ def look_ahead(S: Stepping, k: int, h: float) -> None:
     if P.was[k] >= 0 and 0.0 < gap <= slop:
         # it lies on: to follow what does not count would keep all that rests in motion
         gap = 0.0
-    free = velocity_of(P, k, 0, M.free)
+    free = velocity_of(P, k, 0, M.flight)
     P.ahead[k] = max(gap, 0.0) / h
     P.part[k] = NO_IMPACT
     mean = 0.5 * (before + free)
@@ -81,9 +85,29 @@ def let_meet(S: Stepping, count: int, h: float) -> bool:
     """Let points meet that were taken to be held and press all the same; return if any do."""
     P, some = S.points, False
     for k in range(count):
-        if P.held[k] == 1 and P.r[k, 0] > 0.0:
+        if P.held[k] == HELD and P.r[k, 0] > 0.0:
             look_ahead(S, k, h)
             P.held[k], some = 0, True
+    return some
+
+
+@jitable
+def let_land(S: Stepping, count: int, h: float) -> bool:
+    """Let points close their gaps that were to land without rebound, and do not get there.
+
+    A point that lands stops where it meets the surface. Where others press on its bodies, or land
+    earlier, these do not go the way there: they would hang above the surface for good. Such points
+    end the step at the surface, gap + h u_n' >= 0. Return whether there were any.
+    """
+    P, M, some = S.points, S.motion, False
+    for k in range(count):
+        if P.r[k, 0] == 0.0 or P.part[k] == NO_IMPACT or P.ahead[k] < 0.0:
+            continue
+        left = P.gap[k] + h * velocity_of(P, k, 0, M.shift)
+        counts = MANY_SLOPS * S.plan.scale[group_at(S, k), SLOP]
+        if left > max(counts, SHORT_OF * P.gap[k]):
+            P.ahead[k], P.part[k], P.held[k] = P.gap[k] / h, NO_IMPACT, LANDS
+            some = True
     return some
 
 
@@ -101,7 +125,7 @@ def postpone(S: Stepping, count: int, h: float) -> bool:
         if P.r[k, 0] == 0.0 or rule[RESTITUTION] == 0.0 or P.part[k] != NO_IMPACT:
             continue
         g = group_at(S, k)
-        if P.gap[k] <= S.plan.scale[g, SLOP]:
+        if P.gap[k] <= S.plan.scale[g, SLOP] or P.held[k] == LANDS:
             continue
         # without its impulse
         u = velocity_of(P, k, 0, M.v)

@@ -82,7 +82,7 @@ def add_work(S: Stepping, count: int) -> None:
         for a in range(3):
             u = velocity_of(P, k, a, M.before)
             if P.part[k] != NO_IMPACT:
-                u += (2.0 * P.part[k] - 1.0) * (velocity_of(P, k, a, M.free) - u)
+                u += (2.0 * P.part[k] - 1.0) * (velocity_of(P, k, a, M.flight) - u)
             r, first = P.r[k, a], velocity_of(P, k, a, M.v)
             more, change = P.full[k, a] - r, velocity_of(P, k, a, M.full) - first
             work[WITHOUT] += 0.5 * r * (u + first)

@@ -57,6 +57,7 @@ from mbsim.stepping.arrays import (
 )
 from mbsim.stepping.displacements import (
     NO_IMPACT,
+    fill_flight,
     fill_shift,
     move_bodies,
     spread_parts,
@@ -75,7 +76,7 @@ from mbsim.stepping.friction import (
     let_yield,
 )
 from mbsim.stepping.held import begin_answers
-from mbsim.stepping.impacts import is_held, let_meet, look_ahead, postpone
+from mbsim.stepping.impacts import HELD, is_held, let_land, let_meet, look_ahead, postpone
 from mbsim.stepping.implicit import is_implicit, take_into_step
 from mbsim.stepping.kept import index_kept, recall
 from mbsim.stepping.near_pairs import FARTHER, list_anew
@@ -189,32 +190,31 @@ def start_impulses(scene: Scene, S: Stepping, h: float) -> None:
             # what holds there is not known yet
             M.changed[P.body[k, 0]] = M.changed[P.body[k, 1]] = 1
     M.changed[ground] = 0
+    fill_flight(scene, S, h)
     for k in range(S.tally.count[POINTS]):
         look_ahead(S, k, h)
         fill_drift(P, k, M.before, M.free)
-        P.held[k] = 1 if P.part[k] != NO_IMPACT and is_held(S, k, h) else 0
-        if P.held[k] == 1:
+        P.held[k] = HELD if P.part[k] != NO_IMPACT and is_held(S, k, h) else 0
+        if P.held[k] == HELD:
             P.ahead[k], P.part[k] = max(P.gap[k], 0.0) / h, NO_IMPACT
 
 
 @jitable
-def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
-    """Find impulses and displacements of the points at hand; return 0 or a code."""
+def solve_law(S: Stepping, count: int, ground: int, h: float) -> tuple[float, float, int, bool]:
+    """Find impulses, of what sticks and slips as well.
+
+    Return what a sweep still changes, over what may be left, what part of that was asked for,
+    sweeps, and if it is solved.
+    """
     P, M, tally = S.points, S.motion, S.tally
-    count, nb = tally.count[POINTS], len(scene.bodies.mass)
-    start_impulses(scene, S, h)
-    # `sharp`: part of what the solver may leave; `most`: the largest of that
-    sharp, part, most = 1.0, S.plan.number[LEFT_PART], 0.0
     left, sweeps, solved = 0.0, 0, True
-    for k in range(count):
-        P.mu[k] = P.holds[k]
-        most = max(most, P.least[k])
+    sharp, part = 1.0, S.plan.number[LEFT_PART]
     for attempt in range(MOST_YIELDS + 1 if count > 0 else 0):
-        left, more, newtons, solved = solve_points(P, M, nb, count, (sharp, part))
+        left, more, newtons, solved = solve_points(P, M, ground, count, (sharp, part))
         sweeps += more
         tally.count[NEWTONS] += newtons
         if not math.isfinite(left):
-            return Code.NOT_FINITE
+            break
         if attempt == MOST_YIELDS:
             # what yields or meets by now does so in the next step: impulses are those of the law
             # as it was when they were solved
@@ -231,14 +231,37 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
         changed = let_stick(S, count, h) or changed
         if not let_yield(S, count, h, sharp) and not changed:
             break
-    more_left, more, newtons = limit_rebound(scene, S, count, h, (sharp, part))
-    if not math.isfinite(more_left):
-        return Code.NOT_FINITE
-    left = max(left, more_left)
+    return left, sharp, sweeps, solved
+
+
+@jitable
+def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
+    """Find impulses and displacements of the points at hand; return 0 or a code."""
+    P, M, tally = S.points, S.motion, S.tally
+    count, nb = tally.count[POINTS], len(scene.bodies.mass)
+    start_impulses(scene, S, h)
+    # `sharp`: part of what the solver may leave; `most`: the largest of that
+    sharp, part, most = 1.0, S.plan.number[LEFT_PART], 0.0
+    left, sweeps, solved = 0.0, 0, True
+    for k in range(count):
+        P.mu[k] = P.holds[k]
+        most = max(most, P.least[k])
+    for landing in range(2):
+        left, sharp, more, solved = solve_law(S, count, nb, h)
+        if not math.isfinite(left):
+            return Code.NOT_FINITE
+        sweeps += more
+        more_left, more, newtons = limit_rebound(scene, S, count, h, (sharp, part))
+        if not math.isfinite(more_left):
+            return Code.NOT_FINITE
+        left = max(left, more_left)
+        sweeps += more
+        tally.count[NEWTONS] += newtons
+        spread_parts(scene, S, count, h)
+        fill_shift(scene, S)
+        if landing == 1 or not let_land(S, count, h):
+            break
     move_farther(P, M, count)
-    sweeps += more
-    tally.count[NEWTONS] += newtons
-    spread_parts(scene, S, count, h)
     fill_shift(scene, S)
     pushes = project_positions(P, M.shift, count, h)
     number = tally.number
