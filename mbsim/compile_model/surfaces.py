@@ -100,11 +100,12 @@ def thickness(surface: Array, need: Need) -> float:
     corners, unit = table[:, :9].reshape(count, 3, 3), table[:, UNIT:CORNER_NORMAL]
     ways = min(count, max(LEAST_WAYS, MOST_CROSSINGS // count))
     begins = np.linspace(0, count - 1, ways).astype(np.int64)
+    on_plane, _, _ = corners.swapaxes(0, 1)
     least = math.inf
     for p, n in zip(corners[begins].mean(axis=1), unit[begins], strict=True):
         slope = -unit @ n
         out = np.flatnonzero(slope > SQUARE)
-        way = ((corners[out, 0] - p) * unit[out]).sum(axis=1) / slope[out]
+        way = ((on_plane[out] - p) * unit[out]).sum(axis=1) / slope[out]
         # those that are farther than what was found are not looked at
         near = (way > 0.0) & (way < least)
         out, way = out[near], way[near]
