@@ -8,7 +8,11 @@ the stretch is slip (return mapping):
 
     z = z_kept + X - X_kept,      z := z mu N / |k z|  where |k z| > mu N
 
-    F = -k z - c v, at most mu N,      c v only while it sticks, so that it comes to rest
+    F = -k z - s c v,   s = R/sqrt(R^2 + |c v|^2),   R = mu N - |k z|
+
+The damper lets it come to rest. It has no more than R, what the spring leaves of the limit, and so
+nothing in slip: a damper that came at once where slip that turns comes to stick would make the
+force jump there.
 
 Why X alone cannot do it: X says where the surfaces are, not how they came there. A force
 -clip(k X, mu N) is that of a spring of limited strength: after a reversal it goes on pulling
@@ -26,12 +30,12 @@ def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag, state
     zx = state[0] + x[0] - state[2]
     zy = state[1] + x[1] - state[3]
     pull = k * hypot(zx, zy)
-    if pull > limit:
-        zx, zy = zx * limit / pull, zy * limit / pull
+    if pull >= limit:
+        if pull > 0.0:
+            zx, zy = zx * limit / pull, zy * limit / pull
         fx, fy = -k * zx, -k * zy
     else:
-        fx, fy = -k * zx - c * xdot[0], -k * zy - c * xdot[1]
-        force = hypot(fx, fy)
-        if force > limit:
-            fx, fy = fx * limit / force, fy * limit / force
+        room = limit - pull
+        damping = c * room / hypot(room, c * hypot(xdot[0], xdot[1]))
+        fx, fy = -k * zx - damping * xdot[0], -k * zy - damping * xdot[1]
     return [fx, fy, 0.0], [zx, zy, x[0], x[1]]

@@ -416,6 +416,44 @@ def test_stick_and_slip_are_decided_by_the_same_rate_of_the_limit(rate, nforce_r
             assert -out[0] == pytest.approx(most)
 
 
+@pytest.mark.parametrize("damping", [0.3, 30.0, 3000.0])
+def test_stiction_has_the_same_force_before_and_behind_a_change(damping):
+    """Slip that turns comes to stick with any velocity across, or back where N falls."""
+    law, k, rng = FRICTION_LAWS["STICTION"], 1e4, np.random.default_rng(5)
+    par = parameters(law, tangential_damping=damping, mu_static=0.3, mu_dynamic=0.3)
+    for N, speed in itertools.product((10.0, 1e-3, 1e-9), (1e-6, 1e-2, 10.0)):
+        most, angle, way = 0.3 * N, *rng.uniform(0.0, 2.0 * math.pi, 2)
+        e, v = (np.array([math.cos(a), math.sin(a)]) for a in (angle, way))
+        asked = slip(*speed * v, nforce=N, frozen=1.0, time=1.0)
+        slips = (0.0, 0.0, *most / k * e, 0.0, 0.0, *speed * v * k / most, 1.0, 0.0, 0.0, SLIP)
+        moved, _ = law.force(asked, slips, *par)
+        assert moved[:2] == pytest.approx(-most * e, rel=1e-12)
+        for part in (1.0 - 1e-9, 1.0 + 1e-9):
+            held, _ = law.force(asked, (*part * most / k * e, *slips[2:11], STICK), *par)
+            assert np.hypot(*(np.array(held[:2]) - moved[:2])) < 3e-9 * most
+
+
+def test_what_holds_damps_by_what_the_limit_has_room_for():
+    law, k, c, rng = FRICTION_LAWS["STICTION"], 1e4, 30.0, np.random.default_rng(6)
+    par = parameters(law, tangential_damping=c, mu_static=0.3, mu_dynamic=0.3)
+    for _ in range(200):
+        N, part, speed = 10.0 ** rng.uniform(-3.0, 3.0), rng.uniform(), 10.0 ** rng.uniform(-9.0, 1)
+        angle, way = rng.uniform(0.0, 2.0 * math.pi, 2)
+        z = 0.3 * N * part / k * np.array([math.cos(angle), math.sin(angle)])
+        v = speed * np.array([math.cos(way), math.sin(way)])
+        out, _ = law.force(slip(*v, nforce=N, frozen=1.0), (*z, *(0.0,) * 9, STICK), *par)
+        damper = -(np.array(out[:2]) + k * z)
+        fades = min(1.0, 4.0 * (1.0 - part))
+        fades *= 2.0 - fades
+        # all of c v, or as much as reaches the limit
+        whole = c * v
+        if np.hypot(*(k * z + whole)) > 0.3 * N:
+            assert np.hypot(*(k * z + damper / fades)) == pytest.approx(0.3 * N, rel=1e-9)
+            assert damper / np.hypot(*damper) == pytest.approx(v / speed, abs=1e-6)
+        else:
+            assert damper == pytest.approx(fades * whole, rel=1e-9, abs=1e-12 * N)
+
+
 def test_a_twist_is_held_up_to_its_limit():
     law = FRICTION_LAWS["STICTION"]
     par = parameters(law, tangential_damping=0.0, rotational_stiffness=100.0, torsion_radius=0.1)
@@ -424,6 +462,12 @@ def test_a_twist_is_held_up_to_its_limit():
     assert slider.go(1.0, (0.0, 0.0, 0.004), 10.0)[4] == pytest.approx(-0.4)
     assert slider.go(1.0, (0.0, 0.0, 0.004), 10.0)[4] == pytest.approx(-0.5)
     assert slider.go(1.0, (0.0, 0.0, -0.004), 10.0)[4] == pytest.approx(-0.1)
+    # nor is there any damping left at the limit; half of the limit below it is as much as there is
+    par = parameters(law, tangential_damping=1e6, rotational_stiffness=100.0, torsion_radius=0.1)
+    for twist, torque in ((0.005, 0.5), (0.0025, -0.5)):
+        back = slip(0.0, 0.0, spin=-1.0, at=(0.0, 0.0, twist), frozen=1.0)
+        out, _ = law.force(back, (*(0.0,) * 11, STICK), *par)
+        assert -out[4] == pytest.approx(torque)
 
 
 def test_springs_lose_and_never_win_where_the_normal_stiffness_changes():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 
 import numpy as np
 import pytest
@@ -144,6 +145,22 @@ def test_stiction_asks_for_its_stiffness_where_the_users_normal_force_tells_none
         run("stiction_incline.xml", tmp_path, users)
 
 
+def held(spring, damper, most):
+    """Return what holds: a spring's force, and the part of a damper's that `most` has room for.
+
+    It fades over the last quarter below the limit; beyond, where solvers try, the spring's is it.
+    """
+    pull, square = np.hypot(*spring), damper @ damper
+    if pull >= most:
+        return spring * most / pull if pull > 0.0 else 0.0 * spring
+    part = 1.0
+    if np.hypot(*(spring + damper)) > most:
+        along = spring @ damper
+        part = (math.sqrt(along**2 + square * (most**2 - pull**2)) - along) / square
+    near = min(1.0, 4.0 * (1.0 - pull / most))
+    return spring + part * near * (2.0 - near) * damper
+
+
 def thrown_across(end):
     """Return where a block comes to rest that is thrown across an incline, from its equations.
 
@@ -156,8 +173,7 @@ def thrown_across(end):
 
     def stick(t, y):
         z, v = y[2:4], y[4:6]
-        force = k * z + c * v
-        return [*v, *v, *(along - force * min(1.0, limit / max(np.hypot(*force), 1e-300)))]
+        return [*v, *v, *(along - held(k * z, c * v, limit))]
 
     def slip(t, y):
         z, v = y[2:4], y[4:6]
@@ -175,7 +191,10 @@ def thrown_across(end):
     t, y, phases = 0.0, np.array([0, 0, 0, 0, 0, 2.0]), [(stick, slips), (slip, goes_back)]
     while t < end:
         rates, until = phases[0]
-        found = solve_ivp(rates, (t, end), y, method="DOP853", rtol=1e-12, atol=1e-14, events=until)
+        # no longer than that: a first step that knows no rate yet goes past where the damper fades
+        found = solve_ivp(
+            rates, (t, end), y, method="DOP853", rtol=1e-12, atol=1e-14, max_step=1e-3, events=until
+        )
         t, y = found.t[-1], found.y[:, -1]
         phases.reverse()
     return y[:2]
@@ -259,8 +278,7 @@ def struck(v, w, mu_s, mu_d, k=math.nan, radius=0.1, normal=1e8, inertia=0.004):
 
     def stick(t, y):
         (press, _, along, growth), u = forces(y), slip_of(y)
-        force = -along * y[6:8] - 0.4 * math.sqrt(along) * u
-        force *= min(1.0, mu_s * press / max(np.hypot(*force), 1e-300))
+        force = -held(along * y[6:8], 0.4 * math.sqrt(along) * u, mu_s * press)
         return rates(y, press, force, u - max(growth, 0.0) * y[6:8])
 
     def slip(t, y):
@@ -442,9 +460,9 @@ def test_a_slip_that_is_over_within_a_step_is_seen(tmp_path, method, tol):
 @pytest.mark.parametrize("method", ["DOPRI5", "DOP853", "RADAU5"])
 @pytest.mark.parametrize("tol", [1e-6, 1e-7, 1e-8, 1e-9])
 def test_a_spring_that_holds_for_a_part_of_a_step_is_seen(tmp_path, method, tol):
-    """The cylinder of deck 3 of the standing fuzz: its rim's slip turns, its spring holds 2 ms.
+    """The cylinder of deck 3 of the standing fuzz, on other friction: its spring holds 0.8 ms.
 
-    With steps a tenth as long every method at every tolerance saw it, where most went past it.
+    DOPRI5 and DOP853 at 1e-6 go past it where slip that turns is not looked into.
     """
     others = [f'Body_Rigid id="{k}"' for k in (3, 4)]
     others += [f'Reference_Marker id="{k}"' for k in (30, 40)]
@@ -452,13 +470,16 @@ def test_a_spring_that_holds_for_a_part_of_a_step_is_seen(tmp_path, method, tol)
     others += [f'Force_Contact id="{k}"' for k in (2, 3, 4, 5)]
     lines = fuzz_scenes.deck_of(3)[0].replace('end_time="0.6"', 'end_time="0.3"').splitlines()
     kept = [line for line in lines if not any(line.startswith(f"<{o} ") for o in others)]
-    (tmp_path / "deck.xml").write_text("\n".join(kept))
+    text = re.sub('w_ic_z="[^"]*"', 'w_ic_z="5.149"', "\n".join(kept))
+    law = 'mu_dynamic="0.666" mu_static="0.833"'
+    text = re.sub('mu_dynamic="[^"]*" mu_static="[^"]*"', law, text)
+    (tmp_path / "deck.xml").write_text(text)
     results = mbsim.simulate(mbsim.read_model(tmp_path / "deck.xml"), integrator=method, tol=tol)
     rim = results["events"][results["events"]["element"] == 1]
-    seen = [(float(e["time"]), str(e["kind"])) for e in rim if e["time"] > 0.27]
+    seen = [(float(e["time"]), str(e["kind"])) for e in rim if e["time"] > 0.2616]
     assert [kind for _, kind in seen] == ["stick", "slip"]
     assert [time for time, _ in seen] == pytest.approx(
-        [0.282288, 0.284191], abs=max(1e-5, 30.0 * tol)
+        [0.261746, 0.262556], abs=max(1e-5, 30.0 * tol)
     )
 
 
@@ -600,9 +621,11 @@ def test_a_touch_at_the_limit_sticks_or_slips_by_how_force_and_limit_grow(
         results = run_deck(tmp_path, model, 1e-3, 1e-4, integrator=method, tol=tol)
         force = results["contacts/301/force"][-1]
         found.append(-force[0] / (mu * force[2]))
-        # the damper in parallel takes what sticks to its limit
-        expected.append(1.0 if over < 1.0 else 0.7)
-    assert found == pytest.approx(expected, abs=1e-6)
+        expected.append(over < 1.0)
+    # what sticks is held by what its spring is stretched by and a damper, above what slips
+    assert [force > 0.85 for force in found] == expected
+    assert [force for force in found if force < 0.85] == pytest.approx([0.7] * 6, abs=1e-6)
+    assert max(found) <= 1.0
 
 
 #: A convex mesh that hits a plane with one corner, and then with another while the first slips;

@@ -2,7 +2,9 @@
 
 z is what the spring is stretched by, X less what slipped, and v the velocity of slip:
 
-    stick    F = -k z - c v, at most mu_s N,  z' = v       while k |z| <= mu_s N
+    stick    F = -k z - s c v,  z' = v                     while k |z| <= mu_s N
+             s = g(r) max{s <= 1: |F| <= mu_s N},  r = 1 - k |z|/(mu_s N)
+             g = x (2 - x), x = min(1, 4 r)
     slip     F = -mu_d N e,  z = rho e,  rho = mu_d N/k    while v.e >= rho'
              e' = (v - (v.e) e)/rho = w - (w.e) e,  w = v/rho
 
@@ -20,6 +22,10 @@ slips while v.e >= (mu_d N)'/k. With `incremental` FALSE z
 always stays, F = -k z: the rebound of impacts is nearer to measured ones, but a load that comes
 and goes may give energy by it (Elata). c is `tangential_damping`,
 or a fifth of what is critical for the mass that slips, 0.4 sqrt(k m): more would let it slip late.
+It has the part of c v that mu_s N has room for, and fades over the last quarter of the way there:
+where the spring is at the limit F is what it is in slip, whatever v. Were it -k z - c v, cut to
+mu_s N, it would jump where slip that turns comes to stick with v across e, or with v against e as
+N falls, and be thrown back to slip by that: steps then fall to nothing.
 With `rotational_stiffness` and `torsion_radius` r a torque about the normal holds in the same way,
 up to mu_s N r. With `cff_fnc_name` the size of what that function returns takes the place of
 mu_d N.
@@ -41,6 +47,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.core.arrays import V2
 from mbsim.core.jitable import jitable
 from mbsim.laws.catalog import (
     BEGUN,
@@ -58,6 +65,9 @@ from mbsim.laws.tractrix import dragged
 
 #: Damping over the critical one where none is given.
 DAMPING = 0.2
+
+#: The damper fades from this part below the spring's limit.
+FADES = 0.25
 
 #: A spring is taken to be no shorter than slip over so many times the frequency of what slips.
 SHORTEST = 1e6
@@ -79,6 +89,29 @@ KEPT_Z, _M, KEPT_W, _TIME, _TWIST, _TURNS, _MODE = 2, 4, 6, 8, 9, 10, 11
 
 
 @jitable
+def _held(sx: float, sy: float, dx: float, dy: float, most: float) -> V2:
+    """Return the force against a spring's s and the part of a damper's d that there is room for.
+
+    At the limit that is none, whichever way it slips: the force of what comes to stick, or begins
+    to slip, does not jump.
+    """
+    spring = math.hypot(sx, sy)
+    if spring >= most:
+        part = most / spring if spring > 0.0 else 0.0
+        return -part * sx, -part * sy
+    # |s + part d| = most, by a root that loses no digits
+    square, along = dx * dx + dy * dy, sx * dx + sy * dy
+    inside, part = (most - spring) * (most + spring), 1.0
+    if square + 2.0 * along > inside:
+        root = math.sqrt(along * along + square * inside)
+        part = inside / (along + root) if along > 0.0 else (root - along) / square
+    near = (most - spring) / (FADES * most)
+    if near < 1.0:
+        part *= near * (2.0 - near)
+    return -sx - part * dx, -sy - part * dy
+
+
+@jitable
 def _turn(
     inputs: FrictionInput,
     memory: tuple[float, ...],
@@ -93,7 +126,7 @@ def _turn(
     """
     twist, sign, sure = memory[_TWIST] + inputs.x[2], memory[_TURNS], 1
     most, rate = mu * inputs.nforce * radius, inputs.xdot[2]
-    torque = -k * twist - damping * rate
+    torque, _ = _held(k * twist, 0.0, damping * rate, 0.0, most)
     if inputs.frozen == 1.0 and sign != 0.0:
         torque, twist = -sign * most, sign * most / k
         if math.isnan(inputs.nforce_rate):
@@ -101,8 +134,6 @@ def _turn(
         elif sign * rate * k < mu * inputs.nforce_rate * radius:
             sign = 0.0
         return torque, twist, sign, sure
-    if abs(torque) > most:
-        torque = math.copysign(most, torque)
     sign = 0.0
     if k * abs(twist) > most:
         sign = math.copysign(1.0, twist)
@@ -310,10 +341,7 @@ def stiction(  # noqa: C901
                 sure = 0 if math.isnan(own) else 1
                 mode = SLIP if zx * v[0] + zy * v[1] > own * length else STICK
         most = holds if mode == STICK or (frozen and before == STICK) else limit
-        fx, fy = -k * zx - c * v[0], -k * zy - c * v[1]
-        force = math.hypot(fx, fy)
-        if force > most:
-            fx, fy = fx * most / force, fy * most / force
+        fx, fy = _held(k * zx, k * zy, c * v[0], c * v[1], most)
         if mode == SLIP:
             zx, zy = zx * stretch / length, zy * stretch / length
 
