@@ -29,7 +29,7 @@ from mbsim.model.packing import pack_mesh
 #: Numbers that a process keeps at most: those that were asked for last.
 MOST_NUMBERS = 16_000_000
 #: Triangles from which a file is written: of fewer it takes as long to read.
-FEWEST_TRIANGLES = 500
+FEWEST_TRIANGLES = 50
 #: Bytes of all files at most; those that were asked for last stay.
 MOST_BYTES = 2**29
 
@@ -51,6 +51,11 @@ def kept_surface(vertices: Array, faces: Faces, layered: bool) -> Array:
     while sum(map(len, _here.values())) > MOST_NUMBERS:
         _here.popitem(last=False)
     return found
+
+
+def forget() -> None:
+    """Forget what this process has kept; files stay."""
+    _here.clear()
 
 
 @functools.cache
