@@ -430,7 +430,8 @@ def test_stiction_has_the_same_force_before_and_behind_a_change(damping):
         assert moved[:2] == pytest.approx(-most * e, rel=1e-12)
         for part in (1.0 - 1e-9, 1.0 + 1e-9):
             held, _ = law.force(asked, (*part * most / k * e, *slips[2:11], STICK), *par)
-            assert np.hypot(*(np.array(held[:2]) - moved[:2])) < 3e-9 * most
+            # near the limit by x the damper has up to 2 (2 most) 4 x, and the spring is x shorter
+            assert np.hypot(*(np.array(held[:2]) - moved[:2])) < 1.8e-8 * most
 
 
 def test_what_holds_damps_by_what_the_limit_has_room_for():
