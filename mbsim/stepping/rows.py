@@ -22,6 +22,10 @@ from mbsim.arrays.codes import (
     PEAK_FORCE,
     PEAK_FORCE_TIME,
     PEAK_SLIP,
+    POINT_AREA,
+    POINT_CONTACT,
+    POINT_FORCE,
+    POINT_SLIP,
     TOUCH,
     TOUCHES,
     USED_EVENTS,
@@ -167,6 +171,12 @@ def fill_incidents(scene: Scene, S: Stepping) -> int:
             row[j] = 0.0
         for j in range(3):
             row[INC_POINT + j] = values[KEPT_POINT + j]
+        if len(rows.points) > 0:
+            point = rows.points[k]
+            for j in range(3):
+                point[POINT_FORCE + j] = values[KEPT_FORCE + j]
+            point[POINT_SLIP], point[POINT_AREA] = values[KEPT_SLIP], 0.0
+            point[POINT_CONTACT] = values[KEPT_CONTACT]
         k += 1
     count = k - rows.used[USED_INCIDENTS]
     rows.used[USED_INCIDENTS] = k
