@@ -40,6 +40,8 @@ PRESSED, LANDS, FLIES = 0.0, 1.0, 2.0
 #: A velocity that changes by more than so many times what forces without contacts change has
 #: jumped.
 JUMPS = 10.0
+#: What others hold changes its velocity by this part at most of what it would alone.
+HELD_BACK = 0.1
 
 
 @jitable
@@ -101,16 +103,23 @@ def take_least(S: Stepping, i: int, j: int) -> bool:
 
 @jitable
 def find_what_stays(scene: Scene, S: Stepping, h: float) -> None:
-    """Note the bodies that go no way which counts, whatever their part of the step is."""
+    """Note the bodies that others hold where they are: they go no way in the step which counts.
+
+    What turns round in the air goes none either, but changes its velocity as it would alone.
+    """
     M, plan = S.motion, S.plan
     M.stays[len(S.rest.body)] = 1
     for row in range(bodies_awake(scene)):
         b = body_awake(scene, row)
-        length, most = scene.scales.length[scene.scales.group[b]], 0.0
+        length = scene.scales.length[scene.scales.group[b]]
+        way, changed, alone = 0.0, 0.0, 0.0
         for c in range(6):
-            way = h * max(abs(M.before[b, c]), abs(M.v[b, c]), abs(M.v[b, c] - M.before[b, c]))
-            most = max(most, way if c < 3 else way * length)
-        M.stays[b] = 1 if most <= plan.scale[plan.connected[b], SLOP] else 0
+            size, v, before = 1.0 if c < 3 else length, M.v[b, c], M.before[b, c]
+            way = max(way, size * h * max(abs(before), abs(v)))
+            changed = max(changed, size * abs(v - before))
+            alone = max(alone, size * abs(M.free[b, c] - before))
+        held = way <= plan.scale[plan.connected[b], SLOP] and changed <= HELD_BACK * alone
+        M.stays[b] = 1 if held else 0
 
 
 @jitable

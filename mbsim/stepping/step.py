@@ -90,6 +90,8 @@ from mbsim.stepping.solver import move_farther, project_positions, solve_points
 
 #: How often a step is solved at most, as what stuck slips.
 MOST_YIELDS = 20
+#: So often impacts of what a step throws at each other are put off with what they take solved anew.
+MOST_POSTPONED = 5
 #: How often a step's contact problem is solved at most, each time with what bodies hit that the
 #: impulses threw at it.
 MOST_ATTEMPTS = 4
@@ -207,7 +209,7 @@ def solve_law(S: Stepping, count: int, ground: int, h: float) -> tuple[float, fl
     sweeps, and if it is solved.
     """
     P, M, tally = S.points, S.motion, S.tally
-    left, sweeps, solved = 0.0, 0, True
+    left, sweeps, solved, tried = 0.0, 0, True, 0
     sharp, part = 1.0, S.plan.number[LEFT_PART]
     for attempt in range(MOST_YIELDS + 1 if count > 0 else 0):
         left, more, newtons, solved = solve_points(P, M, ground, count, (sharp, part))
@@ -227,10 +229,15 @@ def solve_law(S: Stepping, count: int, ground: int, h: float) -> tuple[float, fl
             sharp = near
             continue
         changed = let_meet(S, count, h)
-        changed = postpone(S, count, h) or changed
+        if attempt < MOST_POSTPONED:
+            changed = postpone(S, count, h) or changed
+        tried = attempt
         changed = let_stick(S, count, h) or changed
         if not let_yield(S, count, h, sharp) and not changed:
             break
+    if tried >= MOST_POSTPONED:
+        # what these threw at each other flies on: pressed together it would be given energy
+        postpone(S, count, h)
     return left, sharp, sweeps, solved
 
 
