@@ -36,7 +36,7 @@ from mbsim.stepping.arrays import (
     Motion,
     Stepping,
 )
-from mbsim.stepping.displacements import meets_at
+from mbsim.stepping.displacements import is_carried, meets_at
 from mbsim.stepping.points import deepest_of, is_point, put_place, slop_of, take_rows
 from mbsim.stepping.scales import group_at, noise_of
 
@@ -60,9 +60,10 @@ NEAR_ENOUGH = 10.0
 #: most, as the normal of what passes by obliquely is another one there; and by what part of the
 #: step that time changes no more.
 MEETINGS, SETTLED = 4, 1e-9
-#: Motions that are looked at before impulses are known: of both bodies, and of either one alone,
-#: as what lies on something that is held, or is held by something.
-BOTH, ONLY_I, ONLY_J = range(3)
+#: Motions that are looked at before impulses are known: of both bodies with what carries them, and
+#: without, and of either one alone, as what lies on something that is held, or is held by
+#: something.
+CARRIED, BOTH, ONLY_I, ONLY_J = range(4)
 
 
 @jitable
@@ -233,17 +234,18 @@ def find_touch(scene: Scene, S: Stepping, y: F1, pair: int, h: float, depth: flo
 
 @jitable
 def choose_way(scene: Scene, S: Stepping, pair: int, which: int, part: float = 1.0) -> None:
-    """Fill `M.way` by the mean motion of the pair's bodies without impulses, or of one of them.
+    """Fill `M.way` by the mean motion of the pair's bodies without impacts, or of one of them.
 
     It is that up to a part of the step.
     """
     M = S.motion
+    end = M.flight if which == CARRIED else M.free
     for side in range(2):
         g = scene.pairs.graphic_i[pair] if side == 0 else scene.pairs.graphic_j[pair]
         b = scene.graphics.body[g]
-        moves = which == BOTH or which - ONLY_I == side
+        moves = which <= BOTH or which - ONLY_I == side
         for c in range(6):
-            mean = M.before[b, c] + 0.5 * part * (M.free[b, c] - M.before[b, c])
+            mean = M.before[b, c] + 0.5 * part * (end[b, c] - M.before[b, c])
             M.way[side, c] = mean if moves else 0.0
 
 
@@ -326,11 +328,20 @@ def keep_frames(scene: Scene, M: Motion, pair: int) -> None:
 
 
 @jitable
+def one_is_carried(scene: Scene, S: Stepping, pair: int) -> bool:
+    """Return whether others carry one body of a pair, and the other one flies."""
+    i = scene.graphics.body[scene.pairs.graphic_i[pair]]
+    j = scene.graphics.body[scene.pairs.graphic_j[pair]]
+    ground = len(S.rest.body)
+    return i != ground and j != ground and is_carried(S, i) != is_carried(S, j)
+
+
+@jitable
 def look_ahead_of(scene: Scene, S: Stepping, y: F1, pair: int, h: float, depth: float) -> bool:
     """Take the points of a measured pair that meets within the step; False if there is no room."""
     M, room = S.motion, True
     keep_frames(scene, M, pair)
-    for which in range(3):
+    for which in range(CARRIED if one_is_carried(scene, S, pair) else BOTH, ONLY_J + 1):
         choose_way(scene, S, pair, which)
         t = find_touch(scene, S, y, pair, h, depth)
         if t >= 0.0:
@@ -360,7 +371,7 @@ def first_meeting(S: Stepping, first: int, h: float) -> float:
     """
     P, M, t = S.points, S.motion, h
     for k in range(first, S.tally.count[POINTS]):
-        before, free = closing_speed(S, k, M.before), closing_speed(S, k, M.free)
+        before, free = closing_speed(S, k, M.before), closing_speed(S, k, M.flight)
         if P.gap[k] + 0.5 * h * (before + free) < 0.0:
             part = meets_at(P.gap[k], h, before, free)
             slowest = max(S.rules.number[P.contact[k], SLOWEST], noise_of(S, group_at(S, k), h))
@@ -412,7 +423,7 @@ def take_where_it_meets(
     for c in range(3):
         M.push[c] = 0.0
     for _ in range(MEETINGS):
-        choose_way(scene, S, pair, BOTH, t / h)
+        choose_way(scene, S, pair, CARRIED, t / h)
         measure_ahead(scene, S, y, pair, t)
         S.tally.count[POINTS] = first
         begin = scene.pairs.slot[pair]

@@ -33,9 +33,12 @@ RULE_NUMBERS = 5
     KEPT_STICKS,  # 1 where the pair's friction is less than it may be
     KEPT_ROW,
     KEPT_STAYS,  # 1 where a point of the step at hand is the same one
-) = range(10)
-KEPT_POINT, KEPT_NORMAL, KEPT_TANGENT, KEPT_FORCE = 10, 13, 16, 19
-KEPT_COLUMNS = 22
+    KEPT_HIT,  # 1 where an impact with restitution was part of the force
+) = range(11)
+KEPT_POINT, KEPT_NORMAL, KEPT_TANGENT, KEPT_FORCE = 11, 14, 17, 20
+# from the cg of I, then J
+KEPT_ARMS = 23
+KEPT_COLUMNS = 29
 # entries of `Plan.number`: 1 where the error of steps is not estimated; 1 where some kind of pair
 # is not near; part of a step's jumps that the solver may leave; 1 where bodies at rest may sleep;
 # the tolerance
@@ -130,14 +133,15 @@ class Motion(NamedTuple):
     inverse: F3  # (nb, 6, 6) of the mass
     before: F2  # (nb + 1, 6) velocity at the step's begin
     free: F2  # (nb + 1, 6) at its end, were there no contacts
-    flight: F2  # (nb + 1, 6) `free`, but `before` of bodies that others hold where they are
+    carried: F2  # (nb + 1, 6) of `free - before`, what contacts take off it, see `displacements`
+    flight: F2  # (nb + 1, 6) at the step's end, if nothing but these contacts presses
     v: F2  # (nb + 1, 6) with them
     guess: F2  # (nb, 6) as the last solution of the step had it, by which forces are
     full: F2  # (nb + 1, 6) with all rebound, see `rebound`
     work: F2  # (nb, 4) of contacts of the island of which a body is the first
     shift: F2  # (nb + 1, 6) displacement over the step's length
     changed: I1  # (nb + 1,) the sweep that changed a body's velocity last by what counts
-    stays: I1  # (nb + 1,) 1 of bodies that go no way in the step which counts; of ground
+    goes_on: I1  # (nb + 1,) 1 of bodies that go on as if nothing hit them; of ground
     part: F1  # (nb + 1,) of `before` in that, the rest being v's
     touch: F1  # (nb + 1,) part of the step at which a body first meets something that turns it
     spins: F1  # (nb,) kinetic energy of a spin as impulses make it, see `energy`
@@ -145,6 +149,7 @@ class Motion(NamedTuple):
     reach: F1  # (ng,) how far a graphic may come in the step
     went: F1  # (ng,) how far it goes by what impulses give
     slope: F1  # (ny,) y'
+    spare: F2  # (3, 6) changes of a body's velocity, see `energy`
     way: F2  # (2, 6) velocities of the bodies of a pair that is moved ahead
     frames: F2  # (2, 12) of its graphics at the step's begin
     pressed: I1  # (nb + 1,) the try of a step before which a body pressed on one that moves
@@ -372,6 +377,7 @@ def make(
         inverse=numbers(nb, 6, 6),
         before=numbers(nb + 1, 6),
         free=numbers(nb + 1, 6),
+        carried=numbers(nb + 1, 6),
         flight=numbers(nb + 1, 6),
         v=numbers(nb + 1, 6),
         guess=numbers(nb, 6),
@@ -379,7 +385,7 @@ def make(
         work=numbers(nb, 4),
         shift=numbers(nb + 1, 6),
         changed=whole(nb + 1),
-        stays=whole(nb + 1),
+        goes_on=whole(nb + 1),
         part=numbers(nb + 1),
         touch=numbers(nb + 1),
         spins=numbers(nb),
@@ -387,6 +393,7 @@ def make(
         reach=numbers(ng),
         went=numbers(ng),
         slope=numbers(ny),
+        spare=numbers(3, 6),
         way=numbers(2, 6),
         frames=numbers(2, 12),
         pressed=whole(nb + 1),

@@ -1,11 +1,12 @@
 """Where bodies go in a step, by their velocities before and behind what they hit in it.
 
-    q' = q moved on for h by c v + (1 - c) v' + 1/2 (c^2 - (1 - c)^2) d,   d = v_free - v
+    q' = q moved on for h by c v + (1 - c) v' + 1/2 (c^2 - (1 - c)^2) d,   d = v_flight - v
 
-c is the part of the step before an impact with restitution, d what accelerates a body that flies
-before and behind it. c is 1/2 for bodies on which no contact closes in the step, without d, and 0
-for those that a contact stops. Bodies that press on each other have one c, the smallest, and d only
-where nothing but impacts presses on any of them.
+c is the part of the step before an impact with restitution, d what accelerates a body before and
+behind it: forces, and contacts that carry it as they did in the last step. c is 1/2 for bodies on
+which no contact closes in the step, without d, and 0 for those that a contact stops. Bodies that
+press on each other have one c, the smallest, and d only where nothing but impacts, and what carries
+them, presses on them, or on any that they are pressed together with for longer than an impact.
 """
 
 from __future__ import annotations
@@ -13,17 +14,31 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.scene import Scene
-from mbsim.core.arrays import F1
+from mbsim.core.arrays import F1, F2
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
-from mbsim.core.rotation import matrix_from_quaternion, norm, unrotate, vector
+from mbsim.core.rotation import (
+    cross,
+    dot,
+    matrix_from_quaternion,
+    norm,
+    scale,
+    unrotate,
+    vector,
+)
 from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
 from mbsim.dynamics.bodies.configuration import turn
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.stepping.arrays import (
     ASLEEP,
+    KEPT_ARMS,
+    KEPT_BODY_I,
+    KEPT_FORCE,
+    KEPT_HIT,
     LEFT_SPEED,
+    LENGTH,
     POINTS,
+    SLEEPING_ROWS,
     SLOP,
     STEP_LENGTH,
     W_NN,
@@ -40,8 +55,11 @@ PRESSED, LANDS, FLIES = 0.0, 1.0, 2.0
 #: A velocity that changes by more than so many times what forces without contacts change has
 #: jumped.
 JUMPS = 10.0
-#: What others hold changes its velocity by this part at most of what it would alone.
-HELD_BACK = 0.1
+#: A body's velocity at the step's end is another one from this part on of what it would change by
+#: alone.
+OTHERWISE = 0.1
+#: Others hold what changes its velocity by no more than this part of that.
+HELD_UP = 0.9
 
 
 @jitable
@@ -55,6 +73,20 @@ def meets_at(gap: float, h: float, before: float, free: float) -> float:
     if before < 0.0:
         return min(2.0 * c / (root - before), 1.0)
     return min((before + root) / (-2.0 * a), 1.0) if a < 0.0 else 1.0
+
+
+@jitable
+def is_carried(S: Stepping, b: int) -> bool:
+    """Return whether contacts take something off what accelerates a body."""
+    return norm(vector(S.motion.carried[b])) + norm(vector(S.motion.carried[b], 3)) > 0.0
+
+
+@jitable
+def carries(S: Stepping, k: int) -> bool:
+    """Return whether point k presses as it did in the last step, as far as flights say."""
+    i, j, ground = S.points.body[k, 0], S.points.body[k, 1], len(S.rest.body)
+    known = (i == ground or is_carried(S, i)) and (j == ground or is_carried(S, j))
+    return known and S.points.was[k] >= 0
 
 
 @jitable
@@ -73,10 +105,11 @@ def start_parts(scene: Scene, S: Stepping, count: int, h: float) -> None:
         i, j = P.body[k, 0], P.body[k, 1]
         part, touch, flies = P.part[k], P.part[k], FLIES if P.ahead[k] < 0.0 else LANDS
         if part == NO_IMPACT:
-            flies = PRESSED
+            flies = FLIES if carries(S, k) else PRESSED
             after = velocity_of(P, k, 0, M.v)
             if 0.5 * h * abs(after - P.closing[k]) > S.plan.scale[group_at(S, k), SLOP]:
                 free = velocity_of(P, k, 0, M.flight)
+                flies = PRESSED
                 part, touch = 0.0, meets_at(P.gap[k], h, P.closing[k], free)
         for b in (i, j):
             M.part[b], M.touch[b] = min(M.part[b], part), min(M.touch[b], touch)
@@ -90,53 +123,113 @@ def start_parts(scene: Scene, S: Stepping, count: int, h: float) -> None:
 
 
 @jitable
-def take_least(S: Stepping, i: int, j: int) -> bool:
-    """Let two bodies go their ways as one; return whether that changes something."""
+def take_least(S: Stepping, i: int, j: int, lasts: bool) -> bool:
+    """Let two bodies go their ways as one; return whether that changes something.
+
+    Before an impact, and behind it where it throws them apart, each of them flies or does not.
+    """
     M = S.motion
-    if M.part[i] == M.part[j] and M.touch[i] == M.touch[j] and M.flies[i] == M.flies[j]:
-        return False
+    same = M.part[i] == M.part[j] and M.touch[i] == M.touch[j]
     M.part[i] = M.part[j] = min(M.part[i], M.part[j])
     M.touch[i] = M.touch[j] = min(M.touch[i], M.touch[j])
-    M.flies[i] = M.flies[j] = min(M.flies[i], M.flies[j])
-    return True
+    if lasts and M.flies[i] != M.flies[j]:
+        M.flies[i] = M.flies[j] = min(M.flies[i], M.flies[j])
+        return True
+    return not same
 
 
 @jitable
-def find_what_stays(scene: Scene, S: Stepping, h: float) -> None:
-    """Note the bodies that others hold where they are: they go no way in the step which counts.
+def distance(S: Stepping, b: int, v: F2, w: F2) -> float:
+    """Return the largest component by which two velocities of a body differ.
 
-    What turns round in the air goes none either, but changes its velocity as it would alone.
+    Spins count by how fast they move what is the length of its group away.
     """
+    length, most = S.plan.scale[S.plan.connected[b], LENGTH], 0.0
+    for c in range(6):
+        most = max(most, (1.0 if c < 3 else length) * abs(v[b, c] - w[b, c]))
+    return most
+
+
+@jitable
+def rests(S: Stepping, b: int, h: float) -> bool:
+    """Return whether a body goes no way in the step that counts, and others hold it there.
+
+    What turns round in the air changes its velocity by more.
+    """
+    M, way = S.motion, 0.0
+    length = S.plan.scale[S.plan.connected[b], LENGTH]
+    for c in range(6):
+        fastest = max(abs(M.before[b, c]), abs(M.v[b, c]))
+        way = max(way, h * (1.0 if c < 3 else length) * fastest)
+    if way > S.plan.scale[S.plan.connected[b], SLOP]:
+        return False
+    return distance(S, b, M.v, M.before) <= HELD_UP * distance(S, b, M.free, M.before)
+
+
+@jitable
+def find_what_goes_on(scene: Scene, S: Stepping, h: float) -> None:
+    """Note the bodies that others hold, and that go on as if nothing hit them."""
     M, plan = S.motion, S.plan
-    M.stays[len(S.rest.body)] = 1
+    M.goes_on[len(S.rest.body)] = 1
     for row in range(bodies_awake(scene)):
         b = body_awake(scene, row)
-        length = scene.scales.length[scene.scales.group[b]]
-        way, changed, alone = 0.0, 0.0, 0.0
-        for c in range(6):
-            size, v, before = 1.0 if c < 3 else length, M.v[b, c], M.before[b, c]
-            way = max(way, size * h * max(abs(before), abs(v)))
-            changed = max(changed, size * abs(v - before))
-            alone = max(alone, size * abs(M.free[b, c] - before))
-        held = way <= plan.scale[plan.connected[b], SLOP] and changed <= HELD_BACK * alone
-        M.stays[b] = 1 if held else 0
+        off, alone = distance(S, b, M.v, M.flight), distance(S, b, M.free, M.before)
+        little = off <= OTHERWISE * alone and h * off <= plan.scale[plan.connected[b], SLOP]
+        M.goes_on[b] = 1 if (little and is_carried(S, b)) or rests(S, b, h) else 0
 
 
 @jitable
-def fill_flight(scene: Scene, S: Stepping, h: float) -> None:
+def push_carried(S: Stepping, row: int, h: float) -> None:
+    """Add to `M.carried` what the force of a kept contact point does to free bodies in a step."""
+    M, values = S.motion, S.kept.table[row]
+    if values[KEPT_HIT] == 1.0:
+        return
+    for side in range(2):
+        b = int(values[KEPT_BODY_I + side])
+        if b == len(S.rest.body) or S.plan.group[b] >= 0:
+            continue
+        f = scale(h if side == 0 else -h, vector(values[KEPT_FORCE:]))
+        T = cross(vector(values, KEPT_ARMS + 3 * side), f)
+        for c in range(6):
+            inverse = M.inverse[b, c]
+            M.carried[b, c] += dot(vector(inverse), f) + dot(vector(inverse, 3), T)
+
+
+@jitable
+def find_carried(scene: Scene, S: Stepping, h: float) -> None:
+    """Fill what contacts take off what accelerates bodies, if they press on as in the last step.
+
+    Impacts are over with their step, also where they have done more to a body elsewhere. Of bodies
+    that joints hold together it is none: they press on each other by these.
+    """
+    M, kept = S.motion, S.kept
+    for row in range(bodies_awake(scene)):
+        M.carried[body_awake(scene, row), :] = 0.0
+    for row in range(kept.count[SLEEPING_ROWS], kept.count[0]):
+        push_carried(S, row, h)
+    for row in range(bodies_awake(scene)):
+        b = body_awake(scene, row)
+        changed, alone = 0.0, distance(S, b, M.free, M.before)
+        for c in range(6):
+            size = 1.0 if c < 3 else S.plan.scale[S.plan.connected[b], LENGTH]
+            changed = max(changed, size * abs(M.carried[b, c]))
+        if changed > (1.0 + OTHERWISE) * alone:
+            M.carried[b, :] = 0.0
+
+
+@jitable
+def fill_flight(scene: Scene, S: Stepping) -> None:
     """Fill what bodies do in the step until they meet.
 
-    Of what impulses as they stand hold where it is nothing changes: what flies at it is
-    accelerated against it by its own forces.
+    What others carry is accelerated against nothing: what flies at it is, by its own forces.
     """
     M, ground = S.motion, len(S.rest.body)
-    find_what_stays(scene, S, h)
     for c in range(6):
         M.flight[ground, c] = M.free[ground, c]
     for row in range(bodies_awake(scene)):
         b = body_awake(scene, row)
         for c in range(6):
-            M.flight[b, c] = M.before[b, c] if M.stays[b] == 1 else M.free[b, c]
+            M.flight[b, c] = M.free[b, c] + M.carried[b, c]
 
 
 @jitable
@@ -144,23 +237,23 @@ def spread_parts(scene: Scene, S: Stepping, count: int, h: float) -> None:
     """Find the bodies that a contact stops in the step, all that press on them, and joints hold.
 
     Between two bodies of different parts a contact that stays closed would open or go deeper. What
-    stays where it is has no part of the way: what meets it flies there, and on, as if it was
-    ground.
+    goes on as if nothing hit it has no part of an impact: what meets it flies there, and on, as if
+    it was ground.
     """
-    P, plan, stays = S.points, S.plan, S.motion.stays
+    P, plan, goes_on = S.points, S.plan, S.motion.goes_on
     start_parts(scene, S, count, h)
-    find_what_stays(scene, S, h)
+    find_what_goes_on(scene, S, h)
     changed = True
     while changed:
         changed = False
         for k in range(count):
             i, j = P.body[k, 0], P.body[k, 1]
-            if P.r[k, 0] != 0.0 and stays[i] == 0 and stays[j] == 0:
-                changed = take_least(S, i, j) or changed
+            if P.r[k, 0] != 0.0 and goes_on[i] == 0 and goes_on[j] == 0:
+                changed = take_least(S, i, j, P.part[k] == NO_IMPACT) or changed
         for g in range(len(plan.first) - 1):
             first = plan.members[plan.first[g]]
             for m in range(plan.first[g] + 1, plan.first[g + 1]):
-                changed = take_least(S, first, plan.members[m]) or changed
+                changed = take_least(S, first, plan.members[m], True) or changed
 
 
 @jitable
@@ -179,7 +272,7 @@ def shift_of(S: Stepping, b: int, c: int) -> float:
             bent -= 0.5 * (1.0 - part) * (1.0 - part)
     shift = part * M.before[b, c] + (1.0 - part) * M.v[b, c]
     if bent != 0.0:
-        shift += bent * (M.free[b, c] - M.before[b, c])
+        shift += bent * (M.flight[b, c] - M.before[b, c])
     return shift
 
 
@@ -202,7 +295,7 @@ def comes_at(S: Stepping, k: int) -> float:
     P, left = S.points, JUMPS * S.plan.scale[group_at(S, k), LEFT_SPEED]
     speed = P.closing[k]
     if P.part[k] != NO_IMPACT and P.given[k, W_NN] * P.r[k, 0] > left:
-        met = speed + P.part[k] * (velocity_of(P, k, 0, S.motion.free) - speed)
+        met = speed + P.part[k] * (velocity_of(P, k, 0, S.motion.flight) - speed)
         speed = min(speed, met)
     return -speed
 
@@ -210,9 +303,9 @@ def comes_at(S: Stepping, k: int) -> float:
 @jitable
 def velocities_jump(scene: Scene, S: Stepping) -> bool:
     """Return whether some body met another one in the step: velocities jump within it."""
-    P, M, scale = S.points, S.motion, S.plan.scale
+    P, M, judged = S.points, S.motion, S.plan.scale
     for k in range(S.tally.count[POINTS]):
-        if P.r[k, 0] > 0.0 and comes_at(S, k) > scale[group_at(S, k), LEFT_SPEED]:
+        if P.r[k, 0] > 0.0 and comes_at(S, k) > judged[group_at(S, k), LEFT_SPEED]:
             return True
     if S.tally.count[POINTS] == 0:
         return False
@@ -221,7 +314,7 @@ def velocities_jump(scene: Scene, S: Stepping) -> bool:
         v, free, before = M.v[b], M.free[b], M.before[b]
         jump = norm((v[0] - before[0], v[1] - before[1], v[2] - before[2]))
         usual = norm((free[0] - before[0], free[1] - before[1], free[2] - before[2]))
-        if jump > scale[S.plan.connected[b], LEFT_SPEED] + JUMPS * usual:
+        if jump > judged[S.plan.connected[b], LEFT_SPEED] + JUMPS * usual:
             return True
     return False
 
@@ -260,7 +353,7 @@ def way_within(S: Stepping, b: int, c: int, s: float) -> float:
     before, after, touch = M.before[b, c], M.v[b, c], M.touch[b]
     if touch == NO_IMPACT:
         return s * (before + 0.5 * s * (after - before))
-    d = M.free[b, c] - before if M.flies[b] != PRESSED else 0.0
+    d = M.flight[b, c] - before if M.flies[b] != PRESSED else 0.0
     if s < touch:
         return s * (before + 0.5 * s * d)
     left = 1.0 - s

@@ -9,13 +9,13 @@ an impact that a step takes at its end, nor where positions are projected; and k
 that of the inertia as bodies are turned. What is left open by both is known, and no more than that
 may be: whatever else opens the balance is a fault, or a step too long for its forces.
 
-Of bodies that nothing but impacts presses on contacts take that too: their displacements are those
-of flight. With c, d and M as in `displacements`, u = H v,
+Of bodies that nothing but impacts, and what carries them, presses on contacts take that too: their
+displacements are those of flight. With c and d as in `displacements`, a = v_free - v, u = H v,
 
-    r . (u + u')/2 + (c - 1/2) r . H d
+    r . (u + u')/2 + (c - 1/2) (r . H d - (v' - v) . M (d - a))
 
 is what impulses do to a body that flies before an impact and behind it. One that rests behind it is
-not moved on by d there: 1/2 (1 - c)^2 d . M d less.
+not moved on by d there: 1/2 (1 - c)^2 a . M d less.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from mbsim.core.layout import AT_W, BODY_SIZE
 from mbsim.core.rotation import add, dot, rotate, scale, sub, unrotate, vector
 from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
 from mbsim.stepping.arrays import ASLEEP, LEFT_OPEN, POINTS, Stepping
-from mbsim.stepping.displacements import FLIES, LANDS
-from mbsim.stepping.one_point import velocity_of
+from mbsim.stepping.displacements import LANDS, is_carried, is_hit
+from mbsim.stepping.one_point import direction, velocity_of
 
 
 @jitable
@@ -92,42 +92,67 @@ def note_grounded(scene: Scene, S: Stepping, i: int, j: int) -> None:
 
 
 @jitable
-def unmoved(scene: Scene, S: Stepping, b: int) -> float:
-    """Return what a body that rests behind an impact is not given by d there.
-
-    Bodies are turned as at the step's begin.
-    """
-    M = S.motion
-    d = sub(vector(M.free[b]), vector(M.before[b]))
-    turning = sub(vector(M.free[b], 3), vector(M.before[b], 3))
-    square = scene.bodies.mass[b] * dot(d, d) + turned_energy(scene, b, turning, turning)
-    return 0.5 * (1.0 - M.part[b]) ** 2 * square
+def product(scene: Scene, b: int, v: F1, w: F1) -> float:
+    """Return v . M w of body b as it is turned now, global axes."""
+    turning = turned_energy(scene, b, vector(v, 3), vector(w, 3))
+    return scene.bodies.mass[b] * dot(vector(v), vector(w)) + turning
 
 
 @jitable
-def unmoved_once(scene: Scene, S: Stepping, b: int) -> float:
-    """Return `unmoved` of a body and of all that joints hold to it, and 0 when asked again.
+def left_of_flight(scene: Scene, S: Stepping, b: int) -> float:
+    """Return what contacts take of a body that is hit beside `add_losses`' work at its points.
+
+    Bodies are turned as at the step's begin.
+    """
+    M, part = S.motion, S.motion.part[b]
+    if not is_hit(S, b):
+        return 0.0
+    lost = 0.0
+    for c in range(6):
+        M.spare[0, c], M.spare[1, c] = M.v[b, c] - M.before[b, c], M.free[b, c] - M.before[b, c]
+        M.spare[2, c] = M.flight[b, c] - M.before[b, c]
+    if is_carried(S, b):
+        lost += (part - 0.5) * product(scene, b, M.carried[b], M.spare[0])
+    if M.flies[b] == LANDS:
+        lost += 0.5 * (1.0 - part) ** 2 * product(scene, b, M.spare[1], M.spare[2])
+    return lost
+
+
+@jitable
+def left_of_flight_once(scene: Scene, S: Stepping, b: int) -> float:
+    """Return `left_of_flight` of a body and of all that joints hold to it, 0 when asked again.
 
     `Motion.changed` is -1 of what was asked for; the next step begins with 0.
     """
     M, plan, total = S.motion, S.plan, 0.0
-    if M.changed[b] == -1:
+    if b == len(S.rest.body) or M.changed[b] == -1:
         return 0.0
     group = plan.group[b]
     if group < 0:
         M.changed[b] = -1
-        return unmoved(scene, S, b)
+        return left_of_flight(scene, S, b)
     for row in range(plan.first[group], plan.first[group + 1]):
         member = plan.members[row]
         M.changed[member] = -1
-        total += unmoved(scene, S, member)
+        total += left_of_flight(scene, S, member)
     return total
+
+
+@jitable
+def flown(S: Stepping, k: int, side: int, a: int) -> float:
+    """Return (c - 1/2) H d of component a at point k, as far as one of its bodies has it."""
+    M, b, total = S.motion, S.points.body[k, side], 0.0
+    if b == len(S.rest.body) or not is_hit(S, b):
+        return 0.0
+    for c in range(6):
+        total += direction(S.points, k, side, a, c) * (M.flight[b, c] - M.before[b, c])
+    return (M.part[b] - 0.5) * total
 
 
 @jitable
 def add_losses(scene: Scene, S: Stepping, new: F1) -> None:
     """Add what contacts took, before bodies are moved on."""
-    P, M, ground = S.points, S.motion, len(S.rest.body)
+    P, M = S.points, S.motion
     first = len(new) - len(scene.contacts.id)
     for k in range(S.tally.count[POINTS]):
         if P.r[k, 0] == 0.0:
@@ -135,23 +160,13 @@ def add_losses(scene: Scene, S: Stepping, new: F1) -> None:
         i, j = P.body[k, 0], P.body[k, 1]
         c, lost, across = P.contact[k], 0.0, 0.0
         note_grounded(scene, S, i, j)
-        # bodies that press on each other have one of both; what stays, as ground, has none of it
-        b = j if i == ground or (M.stays[i] == 1 and j != ground) else i
-        flies, later = M.flies[b], M.part[b] - 0.5
         for a in range(3):
             before = velocity_of(P, k, a, M.before)
             work = 0.5 * P.r[k, a] * (before + velocity_of(P, k, a, M.v))
-            more = later * P.r[k, a] * (velocity_of(P, k, a, M.flight) - before)
-            if flies == FLIES:
-                work += more
-            elif flies == LANDS:
-                lost -= more
+            work += P.r[k, a] * (flown(S, k, 0, a) + flown(S, k, 1, a))
             lost -= work
             across += work if a > 0 else 0.0
-        if flies == LANDS:
-            for body in (i, j):
-                if body != ground and M.flies[body] == LANDS:
-                    lost += unmoved_once(scene, S, body)
+        lost += left_of_flight_once(scene, S, i) + left_of_flight_once(scene, S, j)
         new[first + c] += lost
         if scene.audit.friction_at[c] >= 0:
             new[scene.audit.friction_at[c]] += across

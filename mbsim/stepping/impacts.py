@@ -15,7 +15,7 @@ from mbsim.stepping.arrays import (
     W_NN,
     Stepping,
 )
-from mbsim.stepping.displacements import NO_IMPACT, meets_at
+from mbsim.stepping.displacements import NO_IMPACT, OTHERWISE, distance, meets_at, rests
 from mbsim.stepping.one_point import apply, velocity_of
 from mbsim.stepping.scales import group_at, noise_of
 
@@ -88,6 +88,32 @@ def let_meet(S: Stepping, count: int, h: float) -> bool:
         if P.held[k] == HELD and P.r[k, 0] > 0.0:
             look_ahead(S, k, h)
             P.held[k], some = 0, True
+    return some
+
+
+@jitable
+def let_carry(S: Stepping, count: int, h: float) -> bool:
+    """Let bodies be carried that are hit and stay where they are, though they were to fly.
+
+    What held them in the last step did not tell: that was an impact, or they had none. Return
+    whether there were any.
+    """
+    P, M, some = S.points, S.motion, False
+    for k in range(count):
+        if P.r[k, 0] == 0.0 or P.part[k] == NO_IMPACT:
+            continue
+        for b in P.body[k]:
+            if b == len(S.rest.body):
+                continue
+            off, alone = distance(S, b, M.flight, M.before), distance(S, b, M.free, M.before)
+            if off > OTHERWISE * alone and rests(S, b, h):
+                some = True
+                for c in range(6):
+                    M.flight[b, c] = M.before[b, c]
+    if some:
+        for k in range(count):
+            if P.part[k] != NO_IMPACT:
+                look_ahead(S, k, h)
     return some
 
 

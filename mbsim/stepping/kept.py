@@ -13,12 +13,14 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, scale, sub, vector
 from mbsim.dynamics.contact.forces import sides
 from mbsim.stepping.arrays import (
+    KEPT_ARMS,
     KEPT_BODY_I,
     KEPT_BODY_J,
     KEPT_CLOSING,
     KEPT_CONTACT,
     KEPT_FORCE,
     KEPT_GAP,
+    KEPT_HIT,
     KEPT_NORMAL,
     KEPT_POINT,
     KEPT_ROW,
@@ -32,6 +34,7 @@ from mbsim.stepping.arrays import (
     STEP_LENGTH,
     Stepping,
 )
+from mbsim.stepping.displacements import NO_IMPACT
 from mbsim.stepping.one_point import slip_at
 
 #: A multiplier that spreads keys over a table: 2^64 over the golden ratio, odd, made positive.
@@ -188,6 +191,7 @@ def keep_points(scene: Scene, S: Stepping) -> None:
         values[KEPT_SLIP] = (x * x + z * z) ** 0.5
         # see `share_sticking`
         values[KEPT_STICKS] = P.mu[k]
+        values[KEPT_HIT] = 0.0 if P.part[k] == NO_IMPACT else 1.0
         n, t = vector(P.normal[k]), vector(P.tangent[k])
         b = cross(n, t)
         force = add(scale(P.r[k, 0], n), add(scale(P.r[k, 1], t), scale(P.r[k, 2], b)))
@@ -195,6 +199,7 @@ def keep_points(scene: Scene, S: Stepping) -> None:
             values[KEPT_POINT + c], values[KEPT_NORMAL + c] = P.point[k, c], n[c]
             values[KEPT_TANGENT + c] = t[c]
             values[KEPT_FORCE + c] = force[c] / h
+            values[KEPT_ARMS + c], values[KEPT_ARMS + 3 + c] = P.arm[k, 0, c], P.arm[k, 1, c]
         row += 1
     kept.count[0] = row
     share_sticking(S)

@@ -59,6 +59,7 @@ from mbsim.stepping.displacements import (
     NO_IMPACT,
     fill_flight,
     fill_shift,
+    find_carried,
     move_bodies,
     spread_parts,
     velocities_jump,
@@ -76,7 +77,15 @@ from mbsim.stepping.friction import (
     let_yield,
 )
 from mbsim.stepping.held import begin_answers
-from mbsim.stepping.impacts import HELD, is_held, let_land, let_meet, look_ahead, postpone
+from mbsim.stepping.impacts import (
+    HELD,
+    is_held,
+    let_carry,
+    let_land,
+    let_meet,
+    look_ahead,
+    postpone,
+)
 from mbsim.stepping.implicit import is_implicit, take_into_step
 from mbsim.stepping.kept import index_kept, recall
 from mbsim.stepping.near_pairs import FARTHER, list_anew
@@ -92,6 +101,9 @@ from mbsim.stepping.solver import move_farther, project_positions, solve_points
 MOST_YIELDS = 20
 #: So often impacts of what a step throws at each other are put off with what they take solved anew.
 MOST_POSTPONED = 5
+#: How often it is solved at most, as bodies that it is solved for turn out to be carried, or to
+#: hang above where they land.
+MOST_LANDINGS = 3
 #: How often a step's contact problem is solved at most, each time with what bodies hit that the
 #: impulses threw at it.
 MOST_ATTEMPTS = 4
@@ -192,7 +204,7 @@ def start_impulses(scene: Scene, S: Stepping, h: float) -> None:
             # what holds there is not known yet
             M.changed[P.body[k, 0]] = M.changed[P.body[k, 1]] = 1
     M.changed[ground] = 0
-    fill_flight(scene, S, h)
+    fill_flight(scene, S)
     for k in range(S.tally.count[POINTS]):
         look_ahead(S, k, h)
         fill_drift(P, k, M.before, M.free)
@@ -253,7 +265,7 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
     for k in range(count):
         P.mu[k] = P.holds[k]
         most = max(most, P.least[k])
-    for landing in range(2):
+    for landing in range(MOST_LANDINGS):
         left, sharp, more, solved = solve_law(S, count, nb, h)
         if not math.isfinite(left):
             return Code.NOT_FINITE
@@ -266,7 +278,10 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
         tally.count[NEWTONS] += newtons
         spread_parts(scene, S, count, h)
         fill_shift(scene, S)
-        if landing == 1 or not let_land(S, count, h):
+        if landing == MOST_LANDINGS - 1:
+            break
+        changed = let_carry(S, count, h)
+        if not let_land(S, count, h) and not changed:
             break
     move_farther(P, M, count)
     fill_shift(scene, S)
@@ -437,6 +452,8 @@ def take_step(
         if committed:
             index_kept(S)
             make_room(scene, S, y, h)
+        find_carried(scene, S, h)
+        fill_flight(scene, S)
         code = find_points(scene, S, y, h, committed)
         if code == 0 and S.rest.count[WOKEN] == 0:
             code = solve_all(scene, S, t, h, y, committed)
