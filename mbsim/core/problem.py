@@ -42,7 +42,8 @@ to the committed one before the run ends, but for codes from AT_ONCE on.
 |         |                        | if HALF, at the step's middle, then HALVES, at its end,    |
 |         |                        | are to be asked: the error of a way followed in one, in    |
 |         |                        | the norm of errors, in out[0]; HIDES (b: y committed): 1   |
-|         |                        | if a force may leave its branch and come back within it    |
+|         |                        | if a force may leave its branch and come back within it,   |
+|         |                        | and more where it would: by so many MILLIONTHS of the step |
 | happens | y, -                   | 1 if an event that is to be located has happened between   |
 |         |                        | the committed point and this one, else 0                   |
 | step    | y, y after (out)       | code; the state a step h after y, of a problem that owns   |
@@ -214,6 +215,8 @@ WATCH_EVERY = 5000
 # and of friction that follows a way in closed form: whether that bends, then two halves of the
 # step; whether a side may have changed twice
 ASK, SETTLE, PASS, PASS_CUT, LOAD, LOAD_AT_MOST, BENDS, HALF, HALVES, HIDES = map(float, range(10))
+#: In what `switching` answers to HIDES a place within the step.
+MILLIONTHS = 10**6
 
 # reasons given to `reject`
 BY_ERROR, BY_CHECK, BY_NOT_FINITE, BY_NEWTON, BY_JUMP = range(5)

@@ -19,6 +19,7 @@ from mbsim.core.problem import (
     HIDES,
     LOAD,
     LOAD_AT_MOST,
+    MILLIONTHS,
     PASS,
     PASS_CUT,
     SETTLE,
@@ -27,6 +28,7 @@ from mbsim.core.problem import (
 from mbsim.core.signature import FLOAT, INT
 from mbsim.integrators.scheme import (
     AT_ONCE,
+    DIP,
     HOLDS,
     LAST_ERROR,
     LOOKS,
@@ -198,9 +200,11 @@ def path_error(p: Problem, m: Method, t: float, h: float) -> float:
 def hidden_side(p: Problem, m: Method, t: float, h: float) -> float:
     """Return a part of the fitted step at which a side differs that does not at its end, else 0.
 
-    The problem is left evaluated at the trial point.
+    Where slip is least it is looked at first. The problem is left evaluated at the trial point.
     """
-    part = 0.0
+    part = m.memory[DIP]
+    if part > 0.0 and not side_at(p, m, t, h, part, ASK):
+        part = 0.0
     for k in range(1, LOOKS_FOR_HIDDEN):
         if part == 0.0 and side_at(p, m, t, h, k / LOOKS_FOR_HIDDEN, ASK):
             part = k / LOOKS_FOR_HIDDEN
@@ -218,7 +222,9 @@ def look_at(p: Problem, m: Method, t: float, h: float) -> bool:
     if m.memory[AT_ONCE] == 1.0:
         m.memory[SWITCHED] = JUST_BEHIND
         return True
-    if ask_switching(p, m, t + h, HIDES, m.trial, m.y) > 0:
+    hides = ask_switching(p, m, t + h, HIDES, m.trial, m.y)
+    m.memory[DIP] = max(0, hides - 1) / MILLIONTHS
+    if hides > 0:
         m.memory[LOOKS] += SIDES
     if ask_switching(p, m, t + h, BENDS, m.trial, m.y) > 0:
         m.memory[LOOKS] += WAYS

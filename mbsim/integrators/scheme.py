@@ -122,7 +122,9 @@ EASE = 76
 LONGEST, LONGER = range(77, 79)
 # of implicit methods: 1 where the last iteration ended at rounding
 AT_ROUNDING = 79
-MEMORY = 80
+# where in the step that was tried slip may stop for a moment, as a part of it; 0 for unknown
+DIP = 80
+MEMORY = 81
 # counts; CODE: of a hook that failed, see `note_failure`; the last two: at how many steps the
 # caller wants to look at the run, row of the timetable
 STEPS, REJECTED, EVALUATIONS, NEXT_OUTPUT, LAST_REASON, CODE, OUTPUTS = range(7)

@@ -613,7 +613,10 @@ CONTACTS = (
     "mbsim.geometry mbsim.dynamics.linearization.contact_slopes "
     "mbsim.dynamics.linearization.memory_slopes"
 )
-BRANCHES = "mbsim.integrators.branches mbsim.integrators.events mbsim.dynamics.events.switching "
+BRANCHES = (
+    "mbsim.integrators.branches mbsim.integrators.events mbsim.dynamics.events.switching "
+    "mbsim.dynamics.events.hidden "
+)
 #: Of contacts that a scene may lack: friction in steps of fixed length, pairs without a closed
 #: form, flat faces that are one incident, bodies that stand on a rim.
 OF_SOME_CONTACTS = (

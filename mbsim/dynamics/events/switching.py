@@ -11,7 +11,6 @@ import math
 
 from mbsim.arrays.codes import (
     ASKS,
-    AUDIT_TOL,
     CHANGED,
     CHANGES,
     CHATTERING,
@@ -50,24 +49,21 @@ from mbsim.dynamics.contact.forces import (
     NORMAL_SLOPE,
     NORMAL_THEN,
     RATE,
-    SLIP,
     STIFFNESS,
     STIFFNESS_SLOPE,
     STIFFNESS_THEN,
-    UNIT,
     contact_of,
     face_weight_of,
     pressing,
 )
 from mbsim.dynamics.contact.memory import slipping_mass
+from mbsim.dynamics.events.hidden import answer_hides, bends, counts_as, follows
 from mbsim.dynamics.expressions.jets import value
 from mbsim.dynamics.forces.applied import side_of
-from mbsim.dynamics.stiction.faces import holds_nothing
 from mbsim.dynamics.stiction.rigid_friction import holding_force, side_of_rigid
 from mbsim.geometry.catalog import AT_POINT
-from mbsim.laws.catalog import BRANCHES, STICK, UNDECIDED
+from mbsim.laws.catalog import BRANCHES, UNDECIDED
 from mbsim.laws.catalog import SLIP as SLIPS
-from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_SPEED, KEPT_W, KEPT_Z, MU_STATIC
 
 #: Each change of side adds 1 to chattering, each step takes a tenth of it.
 COOLING = 0.9
@@ -80,11 +76,6 @@ AHEAD, BEFORE_LEAVE = 1e-6, 1e-3
 #: Depths have digits down to so much of where the point is; times that differ by less are taken as
 #: one, the longest.
 RESOLVED, ALIKE = 1e-12, 0.1
-#: A load that changes by less of itself within a step passes no limit unseen.
-EVEN = 1e-3
-#: Over a shorter part of its length a spring that slips does not stick and slip unseen: it hardly
-#: turns, and where slip is rounding its way has no direction.
-SHORT_WAY = 0.01
 
 
 @jitable
@@ -315,120 +306,6 @@ def watch(scene: Scene, context: int, t: float, y: F1, what: float) -> int:
 
 
 @jitable
-def follows(scene: Scene, s: int) -> bool:
-    """Return whether friction in slot s follows the way of its slip in closed form."""
-    slips = scene.state.touching[s] == 1 and scene.state.mode[s] % BRANCHES == SLIPS
-    return slips and scene.contacts.carried[contact_of(scene, s)] > 0
-
-
-@jitable
-def counts_as(scene: Scene, s: int) -> float:
-    """Return the part of the norm of errors that a change of friction in slot s by all of it is."""
-    squares, group = scene.work.squares, scene.scales.of_contact[contact_of(scene, s)]
-    return scene.work.slot[s, UNIT] / math.sqrt(squares[group])
-
-
-@jitable
-def bends_in(scene: Scene, s: int, y: F1, before: F1) -> bool:
-    """Return whether the way of slip in slot s since y `before` is not friction's direction.
-
-    By an angle that tol sees: less changes its direction by less.
-    """
-    if not follows(scene, s):
-        return False
-    row, z = scene.work.slot[s], scene.slots.z[s]
-    mx, my = y[z] - before[z], y[z + 1] - before[z + 1]
-    size = math.hypot(row[ALONG_X], row[ALONG_Y]) * math.hypot(mx, my)
-    across = abs(row[ALONG_X] * my - row[ALONG_Y] * mx)
-    return counts_as(scene, s) * across > scene.audit.plan[AUDIT_TOL] * size
-
-
-@jitable
-def bends(scene: Scene, y: F1, before: F1) -> bool:
-    """Return whether the way of some slip since y `before` bends."""
-    hit = scene.work.hit
-    for k in range(hit[len(hit) - 1]):
-        if bends_in(scene, hit[k], y, before):
-            return True
-    return False
-
-
-@jitable
-def may_turn(scene: Scene, s: int, h: float) -> bool:
-    """Return whether slip without give in slot s may have gone back within h, and on again.
-
-    So it is where friction alone could have stopped it.
-    """
-    kept, row = scene.state.memory[s], scene.work.slot[s]
-    if kept[KEPT_MODE] != SLIPS or scene.work.touching[s] == 0 or holds_nothing(scene, s):
-        return False
-    most = scene.contacts.friction_par[contact_of(scene, s), MU_STATIC] * row[NORMAL]
-    return slipping_mass(scene, s) * min(kept[KEPT_SPEED], row[SLIP]) <= h * most
-
-
-@jitable
-def slows(scene: Scene, s: int, way: float) -> bool:
-    """Return whether the spring in slot s, which slips at both ends of the step, may have stuck.
-
-    `way` is how far it slipped within the step, in lengths of the spring.
-
-    It sticks where w.e falls below the rate r by which its limit grows by itself. So it may have
-    where w, e and r change by more within the step than is left of w.e - r at either end. One
-    whose way is straight is not asked: what goes back and on again there is seen by its speed.
-    """
-    row, state = scene.work.slot[s], scene.state
-    then, now = state.memory[s], scene.work.memory[s]
-    before = math.hypot(then[KEPT_Z], then[KEPT_Z + 1])
-    after = math.hypot(now[KEPT_Z], now[KEPT_Z + 1])
-    if before == 0.0 or after == 0.0 or row[DEPTH] <= 0.0 or way < SHORT_WAY:
-        return False
-    ax, ay = then[KEPT_Z] / before, then[KEPT_Z + 1] / before
-    bx, by = now[KEPT_Z] / after, now[KEPT_Z + 1] / after
-    ux, uy, vx, vy = then[KEPT_W], then[KEPT_W + 1], now[KEPT_W], now[KEPT_W + 1]
-    # N'/N where it grows; where it falls and the spring's stiffness too it falls no less than so
-    steep = row[STIFFNESS] * row[DEPTH] / row[NORMAL]
-    grew, grows = state.rate[s] / max(state.depth[s], 1e-300), row[RATE] / row[DEPTH]
-    grew *= steep if grew > 0.0 else 1.0
-    grows *= steep if grows > 0.0 else 1.0
-    left = min(ux * ax + uy * ay - grew, vx * bx + vy * by - grows)
-    turned = max(math.hypot(ux, uy), math.hypot(vx, vy)) * math.hypot(bx - ax, by - ay)
-    return left < math.hypot(vx - ux, vy - uy) + turned + abs(grows - grew)
-
-
-@jitable
-def hides(scene: Scene, t: float, y: F1, before: F1) -> bool:
-    """Return whether a spring that sticks may have slipped since y `before` and stick again.
-
-    So it is where load and normal force change by more within the step than is left to the limit.
-    Or whether what slips may have stuck within the step, and slip again.
-    """
-    state, hit, h = scene.state, scene.work.hit, t - scene.state.since[0]
-    for k in range(hit[len(hit) - 1]):
-        s = hit[k]
-        row, z, c = scene.work.slot[s], scene.slots.z[s], contact_of(scene, s)
-        if state.touching[s] == 1 and scene.contacts.rigid[c] == 1 and may_turn(scene, s, h):
-            return True
-        if scene.work.touching[s] == 1 and bends_in(scene, s, y, before):
-            way = math.hypot(y[z] - before[z], y[z + 1] - before[z + 1])
-            if slows(scene, s, way):
-                return True
-        if state.touching[s] == 0 or state.mode[s] % BRANCHES != STICK:
-            continue
-        most = scene.audit.cone[c] * pressing(scene, s)
-        if scene.contacts.carried[c] == 0 or most == math.inf:
-            continue
-        stretch = math.hypot(y[z], y[z + 1])
-        if most <= 0.0 or stretch == 0.0:
-            continue
-        closes = max(abs(row[RATE]) / row[DEPTH], abs(state.rate[s]) / max(state.depth[s], 1e-300))
-        moves = abs(stretch - math.hypot(before[z], before[z + 1])) + h * row[SLIP]
-        part, change = math.hypot(row[ALONG_X], row[ALONG_Y]) / most, h * closes + moves / stretch
-        if part * (1.0 + change) > 1.0 and change > EVEN:
-            return True
-    return False
-
-
-@jitable
 def follow_half(scene: Scene, context: int, t: float, y: F1) -> None:
     """Go on from a step's middle y as if that were committed, as far as friction is concerned."""
     state, work, hit = scene.state, scene.work, scene.state.hit
@@ -480,7 +357,7 @@ def serve_switching(
     if what >= BENDS and what != HIDES and len(scene.work.kept) == 0:
         return 0
     if what == HIDES:
-        return 1 if hides(scene, t, vector_at(a, n), vector_at(b, n)) else 0
+        return answer_hides(scene, t, vector_at(a, n), vector_at(b, n))
     if what == BENDS:
         return 1 if bends(scene, vector_at(a, n), vector_at(b, n)) else 0
     if what == HALF:
