@@ -33,7 +33,7 @@ DECK = """<MotionSolve><Model>
 <Simulate analysis_type="Transient" end_time="0.35" print_interval="0.05"/>
 </Command></MotionSolve>"""
 #: Restitution, friction of sliding and of sticking, and how fast it turns about y.
-ASKED = [(0.216, 0.411, 0.439, 0.164), (0.404, 0.404, 0.45, 0.891), (0.274, 0.531, 0.595, -1.188)]
+ASKED = [(0.275, 0.378, 0.426, -1.632), (0.232, 0.424, 0.461, -0.811), (0.238, 0.364, 0.403, 0.737)]
 
 
 def run(given, method, tol):
@@ -52,6 +52,6 @@ def test_what_cannot_slip_on_sticks_whatever_the_step(given):
         for tol in (1e-5, 1e-6, 1e-7, 1e-8):
             places, seen = run(given, method, tol)
             # a step that began with a slip and ended where it could be did not see that it could
-            # not be at its begin: 6e-5 to 2.5e-4 off, at any tol
+            # not be at its begin: 7e-5 to 5e-4 off, with either explicit method at each tol
             assert seen == kinds, (method, tol)
             np.testing.assert_allclose(places, exact, rtol=0, atol=2.0 * tol)

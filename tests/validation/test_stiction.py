@@ -460,9 +460,9 @@ def test_a_slip_that_is_over_within_a_step_is_seen(tmp_path, method, tol):
 @pytest.mark.parametrize("method", ["DOPRI5", "DOP853", "RADAU5"])
 @pytest.mark.parametrize("tol", [1e-6, 1e-7, 1e-8, 1e-9])
 def test_a_spring_that_holds_for_a_part_of_a_step_is_seen(tmp_path, method, tol):
-    """The cylinder of deck 3 of the standing fuzz, on other friction: its spring holds 0.8 ms.
+    """The cylinder of deck 3 of the standing fuzz, on other friction: its spring holds 0.7 ms.
 
-    DOPRI5 and DOP853 at 1e-6 go past it where slip that turns is not looked into.
+    DOPRI5 and DOP853 go past it at each of these where slip that turns is not looked into.
     """
     others = [f'Body_Rigid id="{k}"' for k in (3, 4)]
     others += [f'Reference_Marker id="{k}"' for k in (30, 40)]
@@ -470,16 +470,16 @@ def test_a_spring_that_holds_for_a_part_of_a_step_is_seen(tmp_path, method, tol)
     others += [f'Force_Contact id="{k}"' for k in (2, 3, 4, 5)]
     lines = fuzz_scenes.deck_of(3)[0].replace('end_time="0.6"', 'end_time="0.3"').splitlines()
     kept = [line for line in lines if not any(line.startswith(f"<{o} ") for o in others)]
-    text = re.sub('w_ic_z="[^"]*"', 'w_ic_z="5.149"', "\n".join(kept))
-    law = 'mu_dynamic="0.666" mu_static="0.833"'
+    text = re.sub('w_ic_z="[^"]*"', 'w_ic_z="7.089"', "\n".join(kept))
+    law = 'mu_dynamic="0.507" mu_static="0.655"'
     text = re.sub('mu_dynamic="[^"]*" mu_static="[^"]*"', law, text)
     (tmp_path / "deck.xml").write_text(text)
     results = mbsim.simulate(mbsim.read_model(tmp_path / "deck.xml"), integrator=method, tol=tol)
     rim = results["events"][results["events"]["element"] == 1]
-    seen = [(float(e["time"]), str(e["kind"])) for e in rim if e["time"] > 0.2616]
+    seen = [(float(e["time"]), str(e["kind"])) for e in rim if 0.2523 < e["time"] < 0.26]
     assert [kind for _, kind in seen] == ["stick", "slip"]
     assert [time for time, _ in seen] == pytest.approx(
-        [0.261746, 0.262556], abs=max(1e-5, 30.0 * tol)
+        [0.252501, 0.253187], abs=max(1e-5, 30.0 * tol)
     )
 
 
@@ -598,12 +598,56 @@ def test_a_cylinder_that_rattles_in_a_groove_gets_on(tmp_path, method, tol):
     assert np.abs(results["bodies/2/velocity"][-1]).max() < 1e-6
 
 
+#: What friction over its limit may be off by behind a touch, by tol.
+AT_THE_LIMIT = {1e-4: 5e-3, 1e-7: 5e-5, 1e-9: 1e-6}
+
+
+def pulls_behind_a_touch(end, slip, mu, exponent, stiffness=1e5, radius=0.1):
+    """Return friction over its limit at a time behind the touch, of what sticks all along.
+
+    A solid sphere of unit mass comes at 1 and slips; from the equations of the law.
+    """
+    from scipy.integrate import solve_ivp
+
+    mindlin, inertia, small = 2.0 * (1.0 - 0.3) / (2.0 - 0.3), 0.4 * radius**2, 1e-9
+
+    def forces(d, along):
+        normal = stiffness * d**exponent
+        k = mindlin * exponent * normal / d
+        # along: stretch and slip
+        force, _ = held(
+            np.array([k * along[0], 0.0]),
+            np.array([0.4 * math.sqrt(k) * along[1], 0.0]),
+            mu * normal,
+        )
+        assert k * along[0] <= mu * normal
+        return normal, force
+
+    def slips(y):
+        return y[3] - (radius - 0.5 * y[0]) * y[4]
+
+    def rates(t, y):
+        d, closing, z = y[:3]
+        normal, force = forces(d, (z, slips(y)))
+        turn = -(radius - 0.5 * d) / inertia * force
+        return [closing, -normal, slips(y) - (exponent - 1.0) * closing / d * z, -force, -turn]
+
+    # until then speeds are constant, so that the spring grows as the depth does
+    begin = [small, 1.0, slip * small / exponent, slip, 0.0]
+    y = solve_ivp(rates, (small, end), begin, method="DOP853", rtol=1e-11, atol=1e-16).y[:, -1]
+    normal, force = forces(y[0], (y[2], slips(y)))
+    return force / (mu * normal)
+
+
 @pytest.mark.parametrize("method", ["DOPRI5", "DOP853", "RADAU5"])
 @pytest.mark.parametrize(("tol", "margin"), [(1e-4, 0.1), (1e-7, 4e-3), (1e-9, 2e-3)])
 def test_a_touch_at_the_limit_sticks_or_slips_by_how_force_and_limit_grow(
     tmp_path, method, tol, margin
 ):
-    """Both begin at 0, within a step: k v against mu_s N', however the step came to be."""
+    """Both begin at 0, within a step: k v against mu_s N', however the step came to be.
+
+    Where the spring was not at its limit at most in a short step, most of what holds slipped.
+    """
     mindlin, slip = 2.0 * (1.0 - 0.3) / (2.0 - 0.3), 0.4
     found, expected = [], []
     sides, gaps = (1.0 - margin, 1.0 + margin), (3e-5, 7.1e-5, 1e-4)
@@ -621,11 +665,11 @@ def test_a_touch_at_the_limit_sticks_or_slips_by_how_force_and_limit_grow(
         results = run_deck(tmp_path, model, 1e-3, 1e-4, integrator=method, tol=tol)
         force = results["contacts/301/force"][-1]
         found.append(-force[0] / (mu * force[2]))
-        expected.append(over < 1.0)
-    # what sticks is held by what its spring is stretched by and a damper, above what slips
-    assert [force > 0.85 for force in found] == expected
-    assert [force for force in found if force < 0.85] == pytest.approx([0.7] * 6, abs=1e-6)
-    assert max(found) <= 1.0
+        expected.append(0.7)
+        if over < 1.0:
+            # it touches at the time `gap`
+            expected[-1] = pulls_behind_a_touch(1e-3 - gap, slip, mu, exponent)
+    assert found == pytest.approx(expected, abs=AT_THE_LIMIT[tol])
 
 
 #: A convex mesh that hits a plane with one corner, and then with another while the first slips;
