@@ -47,6 +47,7 @@ from mbsim.integrators.scheme import (
     EVALUATIONS,
     EXPLICIT_STEPS,
     FIRST_MAX,
+    H_LARGEST,
     IMPLICIT_STEPS,
     JACOBIANS,
     KEEPS_TO_BOUND,
@@ -80,8 +81,11 @@ STEADY = 3
 #: Steps found stiff before AUTO changes over, and others that make it forget them.
 FIRST_PATIENCE, FORGET = 15, 6
 #: A run that changes over within so many steps has been stiff from its begin: going back there
-#: costs about what the implicit method takes until it runs well from anywhere else.
-BEGIN_STEPS = 4 * FIRST_PATIENCE
+#: costs about what the implicit method takes until it runs well from anywhere else. It goes on
+#: from where it is if steps at the bound are a smaller part than this of what their error allows.
+BEGIN_STEPS, SHAKES = 4 * FIRST_PATIENCE, 0.2
+#: And if a step before was so many times as long: it has not been stiff from its begin.
+LONGER_BEFORE = 2.0
 #: Steps over which their number a time is taken: an impact is shorter.
 WINDOW = 200
 #: Of the explicit method, where nothing is taken again: what work is counted in.
@@ -110,6 +114,10 @@ IMPLICIT_START = 250.0
 #: And for a step of its own.
 IMPLICIT_STEP = 25.0
 WRONG, SHORT_TELLS = EVALUATIONS_A_STEP * FIRST_PATIENCE + IMPLICIT_START, 0.2
+#: Where the error tells that the implicit method takes far less, it is tried again after as many
+#: stiff steps as cost what it takes to begin, whatever came of it before: that may have been in an
+#: impact, which is over.
+MOST_PATIENCE = math.ceil(IMPLICIT_START / EVALUATIONS_A_STEP)
 
 
 @jitable
@@ -180,6 +188,18 @@ def is_smooth(m: Method, ahead: float) -> bool:
     return ahead * saved - IMPLICIT_START > EVALUATIONS_A_STEP * WORTH_SMOOTH
 
 
+def is_since_begin(m: Method) -> bool:
+    """Return whether the model was stiff from its begin, or what rests was shaken, or thrown.
+
+    Else longer steps went before, as of a fall, and those at the bound have errors far below the
+    tolerance: the implicit method goes on as well from there, and would take long until there.
+    """
+    thrown = m.memory[LAST_STEP] < THROWS * m.memory[STIFF_STEP]
+    found = m.counts[STEPS] > 0 and m.memory[STIFF_STEPS] >= m.memory[PATIENCE]
+    longer = m.memory[H_LARGEST] > LONGER_BEFORE * m.memory[STIFF_STEP]
+    return bool(thrown or m.memory[PART] >= SHAKES or not (found and longer))
+
+
 @jitable
 def begins_stiff(m: Method, steps: Steps, t_end: float) -> bool:
     """Return whether stability will bound so many steps that the implicit method is to begin."""
@@ -207,6 +227,8 @@ def is_thrown(m: Method, ahead: float) -> bool:
     the bound that is shorter than the run's mean is of an impact, which leaves by itself.
     """
     began = m.memory[COSTLY] == math.inf and m.counts[STEPS] <= BEGIN_STEPS
+    # what has flown or bounced for longer than a step at the bound does so by itself
+    began = began and m.memory[CALM_STEPS] < 1.0
     thrown = m.memory[WAS_CUT] == 0.0 and m.memory[LAST_STEP] < THROWS * m.memory[STIFF_STEP]
     usual = (m.memory[TIME] - m.memory[BEGUN]) / m.memory[EXPLICIT_STEPS]
     rests = m.memory[STIFF_STEPS] >= STEADY and m.memory[STIFF_STEP] >= usual
@@ -239,7 +261,8 @@ def is_stiff(m: Method, steps: Steps, h: float, t_end: float) -> bool:
         return True
     # as many steps a time as when it was stiff: it is so again, though nothing else may show it
     again = m.memory[PACE] >= m.memory[COSTLY] and taken >= max(WINDOW, m.memory[PATIENCE])
-    if again or m.memory[STIFF_STEPS] >= m.memory[PATIENCE]:
+    patience = min(m.memory[PATIENCE], MOST_PATIENCE) if smooth else m.memory[PATIENCE]
+    if again or m.memory[STIFF_STEPS] >= patience:
         return enough
     return ahead > MANY and taken >= m.memory[PATIENCE]
 

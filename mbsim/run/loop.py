@@ -433,6 +433,8 @@ class Runner:
             problem.ROWS_FULL,
             problem.CHANGES_OVER,
         )
+        if outcome == problem.CHANGES_OVER and not self.methods.is_since_begin:
+            may_go_back = False
         if self._first is not None and not (may_go_back and self.methods.may_begin_anew):
             self._first = None
             self.recorder.settle()

@@ -23,6 +23,7 @@ from mbsim.integrators.changing import (
     IMPLICIT_START,
     IMPLICIT_WORK,
     SHORT_STAY,
+    is_since_begin,
 )
 
 if TYPE_CHECKING:
@@ -293,6 +294,11 @@ class Methods:
             return False
         short = self.arrays.counts[scheme.STEPS] <= BEGIN_STEPS
         return bool(self.arrays.memory[scheme.WATCH] == 1.0 and self.changes == 0 and short)
+
+    @property
+    def is_since_begin(self) -> bool:
+        """Whether AUTO's implicit method is to run from the begin."""
+        return is_since_begin(self.arrays)
 
     def begin_anew(self, restore: Callable[[], None]) -> str:
         """Let AUTO's implicit method run from the begin, to which `restore` goes back.

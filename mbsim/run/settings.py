@@ -37,6 +37,9 @@ _AT_ONCE = ("STATIC", "LINEAR")
 TIGHTEST = 1e-15
 #: Of an Adams deck, so that its curves agree with Adams' own to the digits that those carry.
 DEFAULT_TOL_ADAMS = 1e-8
+#: The loosest tol of a method with an estimate of its error. Within a looser one what lies on a
+#: contact bounces for good, or slips, and takes more steps.
+LOOSEST = 1e-2
 #: Who says tol, where that is no deck.
 BY_CALLER = "as the command line says"
 #: What tol is of `integr_tol`: MotionSolve's default, 1e-3, is then the default.
@@ -186,6 +189,13 @@ def _tolerance(model: Model, simulation: Simulation, tol: float | None) -> tuple
         except ModelError as error:
             raise ModelError(f"{where}: Param_Transient: {name}: {error}; {said}") from None
     return DEFAULT_TOL_ADAMS if adams else DEFAULT_TOL, "the default"
+
+
+def _no_looser(stage: Stage) -> Stage:
+    """Return a stage whose tol is LOOSEST where a looser one was said."""
+    if not stage.tol > LOOSEST:
+        return stage
+    return replace(stage, tol=LOOSEST, tol_from=f"for {stage.tol:g}, {stage.tol_from}")
 
 
 def _asked_method(model: Model, sources: Any, integrator: str | None) -> tuple[str, str]:
@@ -369,6 +379,8 @@ def settle(
     if awake and method != RIGID:
         notes.append(f"Param_Transient sleep: is for MOREAU; nothing sleeps with {method}")
     notes += _late_sensors(model, stages)
+    if method not in (RIGID, "VERLET"):
+        stages = [_no_looser(stage) for stage in stages]
     settings = Settings(tuple(stages), method, (*notes, *said_of_names))
     return replace(settings, notes=(*settings.notes, f"tol {settings.tolerances}"))
 
