@@ -128,7 +128,8 @@ def test_the_error_of_the_last_few_steps_at_the_bound_tells_how_long_others_woul
         mbsim.simulate(model, integrator=method, tol=tol).stats for method in ("AUTO", "RADAU5")
     )
     assert auto["rhs_evaluations"] - auto["implicit_evaluations"] < 6 * 45
-    assert auto["steps"] == stiff["steps"]
+    # from the begin on, or from where it is, whichever takes less
+    assert auto["rhs_evaluations"] < stiff["rhs_evaluations"] + 6 * 45
 
 
 @pytest.mark.parametrize(("name", "part"), [("torsion_top", 0.05), ("bushing_chain", 0.4)])
