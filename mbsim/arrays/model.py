@@ -72,6 +72,7 @@ class Contacts(NamedTuple):
     framed: I1  # (nc,) 1 where the law needs the incident marker's own axes
     memory: I1  # (nc,) numbers that the friction law keeps
     carried: I1  # (nc,) how many of these are part of y
+    left: I1  # (nc,) which of them says how far it is beyond its branch, 0 for none
     spreads: I1  # (nc,) 1 where the law is asked all over a patch: `contact.spreading`
     rims: I1  # (nc,) how the law is asked on a rim, AT_POINTS, ...: `contact.rims`
     numbers: F2  # (nc, ...) of the deck, but for the laws' own: see dynamics.contact.forces

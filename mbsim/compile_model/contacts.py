@@ -339,7 +339,7 @@ def contacts_table(
     """
     n = len(contacts)
     normal, friction, addresses, uses_x = [], [], [], np.zeros(n, dtype=bool)
-    memory, carried, spreads, rims = (np.zeros(n, dtype=np.int64) for _ in range(4))
+    memory, carried, left, spreads, rims = (np.zeros(n, dtype=np.int64) for _ in range(5))
     for k, contact in enumerate(contacts):
         if contact.id in user_normal:
             own = user_normal[contact.id]
@@ -359,7 +359,7 @@ def contacts_table(
             friction.append(friction_parameters(friction_law, contact))
             addresses.append(abi.friction_address(friction_law))
             uses_x[k], memory[k] = friction_law.uses_x, friction_law.memory
-            carried[k] = friction_law.carried
+            carried[k], left[k] = friction_law.carried, friction_law.left
             spreads[k] = not (memory[k] or uses_x[k] or friction_law.of_area)
             if contact.id in with_rims:
                 rims[k] = on_rims(friction_law, contact.id in user)
@@ -395,6 +395,7 @@ def contacts_table(
         ),
         memory=memory,
         carried=carried,
+        left=left,
         spreads=spreads,
         rims=rims,
         numbers=table([np.array(c.numbers) for c in contacts]),

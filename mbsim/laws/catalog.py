@@ -23,7 +23,8 @@ A law with ``modes`` keeps to the committed `branch` within a step that is ``fro
 which branch the point asks for: `mode` and 4 times a number of its own. Steps end where that
 changes, and what is integrated is then set to what the law keeps. Where the branch depends on how
 fast N changes, which only the end of a step can tell, it says UNDECIDED, and is asked again with
-that.
+that. One of the numbers that it keeps, `left`, may be how far the point is beyond the committed
+branch, below 0 on it: smooth, so that the time of a change is soon found, and 0 where not known.
 """
 
 from __future__ import annotations
@@ -96,6 +97,7 @@ class FrictionLaw(NamedTuple):
     of_area: bool = False  # whether it is that of a whole area, with its torque against spin
     takes_function: bool = False  # whether a user's function may give its friction of sliding
     modes: bool = False  # whether it tells STICK from SLIP, so that steps end where that changes
+    left: int = 0  # of modes: which number kept is how far it is beyond its branch, 0 for none
     rigid: FrictionLaw | None = None  # where what sticks is held by equations
 
 
@@ -157,6 +159,7 @@ def friction_law(
     of_area: bool = False,
     takes_function: bool = False,
     modes: bool = False,
+    left: int = 0,
     rigid: FrictionLaw | None = None,
 ) -> Callable[[Law], Law]:
     """Register the decorated function as the friction law `name` of these attributes."""
@@ -166,7 +169,18 @@ def friction_law(
         names = tuple(each.name if isinstance(each, Parameter) else each for each in parameters)
         made = jitable(force)
         law = FrictionLaw(
-            name, made, names, own, memory, carried, uses_x, of_area, takes_function, modes, rigid
+            name,
+            made,
+            names,
+            own,
+            memory,
+            carried,
+            uses_x,
+            of_area,
+            takes_function,
+            modes,
+            left,
+            rigid,
         )
         FRICTION_LAWS.put(name, law)
         return force

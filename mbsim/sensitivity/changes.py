@@ -39,6 +39,7 @@ from mbsim.sensitivity.arrays import (
     UP,
     Variations,
 )
+from mbsim.sensitivity.branches import ANY_BRANCH, branch_of, find_change, tells
 from mbsim.sensitivity.later import add_motion, touch_later
 from mbsim.sensitivity.twin import half_step, set_parameter
 
@@ -48,16 +49,8 @@ FARTHEST = 100.0
 NUDGE = 1e-3
 #: What is left is halved at every so manieth try at least.
 EVERY = 4
-#: Stands for a change of whatever branch where a slot is taken; those of single slots are below.
-ANY_BRANCH = -1
 #: A jump of f counts if what it does to y over the step is more than this part of the usual size.
 JUMPS = 1e-13
-
-
-@jitable
-def branch_of(s: int) -> int:
-    """Return what stands for the branch of slot s in place of a slot, and back."""
-    return ANY_BRANCH - 1 - s
 
 
 @jitable
@@ -99,6 +92,10 @@ def crossing(
     Looked for in all of it, or no farther than `around` from where it does with e = 0.
     """
     set_parameter(V, view(V.words[TWIN], Scene), scene, k, e)
+    if slot < ANY_BRANCH and tells(scene, branch_of(slot)):
+        found = find_change(V, scene, t, h, k, e, branch_of(slot), around)
+        if not math.isnan(found):
+            return found
     before = 1 - scene.work.touching[slot] if slot >= 0 else 0
     low, high = 0.0, 1.0
     if around > 0.0:

@@ -52,7 +52,8 @@ from mbsim.sensitivity.arrays import (
     UP_TO,
     Variations,
 )
-from mbsim.sensitivity.changes import ANY_BRANCH, branch_of, crossing, jump_at
+from mbsim.sensitivity.branches import ANY_BRANCH, branch_of
+from mbsim.sensitivity.changes import crossing, jump_at
 from mbsim.sensitivity.twin import half_step, is_asked, keep_change, keep_side, set_parameter
 
 #: Times of changes are looked for along a straight line as long as this part of the problem's own

@@ -372,7 +372,7 @@ def test_stiction_keeps_its_mode_within_a_step():
     law = FRICTION_LAWS["STICTION"]
     par, k = parameters(law, tangential_damping=0.0), 1e4
     # z and M are integrated by whoever asks
-    out, kept = law.force(slip(1.0, 0.0), (1e-5, *(0.0,) * 11), *par)
+    out, kept = law.force(slip(1.0, 0.0), (1e-5, *(0.0,) * (law.memory - 1)), *par)
     assert out[6] == STICK
     # beyond the limit: the force of a step that sticks stays at it, the mode tells
     beyond = 2.0 * 5.0 / k
@@ -467,7 +467,7 @@ def test_a_twist_is_held_up_to_its_limit():
     par = parameters(law, tangential_damping=1e6, rotational_stiffness=100.0, torsion_radius=0.1)
     for twist, torque in ((0.005, 0.5), (0.0025, -0.5)):
         back = slip(0.0, 0.0, spin=-1.0, at=(0.0, 0.0, twist), frozen=1.0)
-        out, _ = law.force(back, (*(0.0,) * 11, STICK), *par)
+        out, _ = law.force(back, (*(0.0,) * 11, STICK, 0.0), *par)
         assert -out[4] == pytest.approx(torque)
 
 
@@ -475,16 +475,18 @@ def test_springs_lose_and_never_win_where_the_normal_stiffness_changes():
     law = FRICTION_LAWS["STICTION"]
     par = parameters(law, tangential_stiffness=math.nan, tangential_damping=0.0)
     # as a force at touch, then as a stretch
-    out, kept = law.force(slip(0.0, 0.0, stiffness=1e5), (1e-2, *(0.0,) * 11), *par)
+    out, kept = law.force(slip(0.0, 0.0, stiffness=1e5), (1e-2, *(0.0,) * (law.memory - 1)), *par)
     change, stiffness = 1e-3, 1e5
     for growth in (0.7, 1.6, -1.2, -3.4, 2.3):
         before, z = out[5], np.array(kept[:2])
         for _ in range(1000):
             # Euler's method, in which the spring eases by exp(-growth) but for a part of 1e-3
             asked = slip(0.0, 0.0, stiffness=stiffness, growth=growth)
-            rates = law.force(asked, (*z, *kept[2:12]), *par)[1][12:]
+            rates = law.force(asked, (*z, *kept[2 : law.memory]), *par)[1][law.memory :]
             z, stiffness = z + change * np.array(rates), stiffness * math.exp(change * growth)
-        out, kept = law.force(slip(0.0, 0.0, stiffness=stiffness), (*z, *kept[2:12]), *par)
+        out, kept = law.force(
+            slip(0.0, 0.0, stiffness=stiffness), (*z, *kept[2 : law.memory]), *par
+        )
         assert out[5] <= before * math.exp(-abs(growth)) * (1 + 5e-3)
 
 
@@ -503,6 +505,6 @@ def test_a_limit_of_the_users_own_takes_the_place_of_the_dynamic_one():
     law = FRICTION_LAWS["STICTION"]
     par = parameters(law, tangential_damping=0.0)
     given = slip(1.0, 0.0)._replace(limit=1.7)
-    out, kept = law.force(given, (1.0, *(0.0,) * 11), *par)
+    out, kept = law.force(given, (1.0, *(0.0,) * (law.memory - 1)), *par)
     assert -out[0] == pytest.approx(1.7)
     assert 1e4 * kept[2] == pytest.approx(1.7)

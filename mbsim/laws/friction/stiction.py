@@ -84,8 +84,9 @@ NEAR = 1e-6
 EARLY = 1e-3
 
 #: What is kept: z, or M; z where it slips, M and its rate w then; time then; twist less turn since
-#: touch, and the sign of its slip; mode.
-KEPT_Z, _M, KEPT_W, _TIME, _TWIST, _TURNS, _MODE = 2, 4, 6, 8, 9, 10, 11
+#: touch, and the sign of its slip; mode; how far it is beyond the committed branch, a smooth number
+#: that is 0 where the branch changes, or 0 where none is known.
+KEPT_Z, _M, KEPT_W, _TIME, _TWIST, _TURNS, _MODE, _LEFT = 2, 4, 6, 8, 9, 10, 11, 12
 
 
 @jitable
@@ -233,11 +234,12 @@ def rigid(
         flag=True,
         about="whether the spring keeps its force, not its stretch, as N grows",
     ),
-    memory=12,
+    memory=13,
     carried=2,
     uses_x=True,
     takes_function=True,
     modes=True,
+    left=_LEFT,
     rigid=FrictionLaw(
         "STICTION", rigid, _RIGID_PARAMETERS, memory=5, takes_function=True, modes=True
     ),
@@ -269,7 +271,7 @@ def stiction(  # noqa: C901
         nothing = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, SLIP, SLIP, 1.0, 0.0)
         kept = (px, py) if before == SLIP else (0.0, 0.0)
         z = (memory[KEPT_Z], memory[KEPT_Z + 1])
-        still = (*kept, *z, *kept, 0.0, 0.0, time, -inputs.x[2], 0.0, SLIP)
+        still = (*kept, *z, *kept, 0.0, 0.0, time, -inputs.x[2], 0.0, SLIP, 0.0)
         return nothing, (*still, 0.0, 0.0)
     c, heavy = tangential_damping, math.sqrt(k * inputs.mass)
     if math.isnan(c):
@@ -287,7 +289,7 @@ def stiction(  # noqa: C901
     follows = max(stretch, math.hypot(v[0], v[1]) * heavy / (k * SHORTEST))
     wx, wy = (v[0] / follows, v[1] / follows) if follows > 0.0 else (0.0, 0.0)
 
-    mode, sticks, sure = STICK, before != SLIP, 1
+    mode, sticks, sure, left = STICK, before != SLIP, 1, 0.0
     zx, zy = px, py
     if not sticks:
         # the spring's direction, behind the slip since the committed state
@@ -306,7 +308,7 @@ def stiction(  # noqa: C901
             if not math.isnan(change):
                 # how fast z grows by itself, or less where k grows and the force stays
                 own = change / k - stretch * (changes - ease)
-                mode = SLIP if along >= own else STICK
+                mode, left = SLIP if along >= own else STICK, own - along
             elif since > 0.0:
                 own = abs(stretch - long) / since + stretch * abs(growth)
                 sure = 1 if abs(along) > CLEAR * own else 0
@@ -330,6 +332,7 @@ def stiction(  # noqa: C901
             zx, zy = px / k, py / k
         length = math.hypot(zx, zy)
         mode = STICK if k * length <= holds else SLIP
+        left = k * length - holds if before != SLIP else 0.0
         early = EARLY * math.hypot(v[0], v[1]) * heavy / k
         near = NEAR * length + (early if before == BEGUN else min(0.5 * length, early))
         if before != SLIP and holds < k * length and k * (length - near) <= holds:
@@ -353,7 +356,7 @@ def stiction(  # noqa: C901
         torque, twist, sign, known = _turn(
             inputs, memory, mu, rotational_stiffness, damping, torsion_radius
         )
-        sure = min(sure, known)
+        sure, left = min(sure, known), 0.0
     if sure == 0:
         mode = before
     branch = mode + BRANCHES * (sign if sign >= 0.0 else 2.0) if sure == 1 else UNDECIDED
@@ -371,6 +374,6 @@ def stiction(  # noqa: C901
         px, py = zx, zy
     elif before != SLIP:
         px, py = 0.0, 0.0
-    held = (px, py, zx, zy, px, py, wx, wy, time, twist - inputs.x[2], sign, mode)
+    held = (px, py, zx, zy, px, py, wx, wy, time, twist - inputs.x[2], sign, mode, left)
     given = (fx, fy, 0.0, 0.0, torque, stored, mode, branch, size, unit)
     return given, (*held, rx, ry)
