@@ -38,7 +38,8 @@ from mbsim.sensitivity.arrays import (
     UP,
     Variations,
 )
-from mbsim.sensitivity.changes import branch_of, crossing
+from mbsim.sensitivity.branches import branch_of
+from mbsim.sensitivity.changes import crossing
 from mbsim.sensitivity.tableaus import OF_FIFTH, A, C, E
 from mbsim.sensitivity.twin import half_step, set_parameter
 
@@ -157,9 +158,9 @@ def slope_of(V: Variations, scene: Scene, t: float, k: int, j: int, y: F1, f: F1
 
 @jitable
 def start(V: Variations, scene: Scene, row: int, k: int) -> int:
-    """Put all motions at a kept point, of the run alone with k < 0; return a code."""
+    """Put both sides at a kept point, or the run with k < 0; return a code."""
     V.words[AGAIN], code = row + 1, 0
-    for j in range(1 if k < 0 else MOTIONS):
+    for j in range(RUN if k < 0 else MORE, MORE if k < 0 else MOTIONS):
         y, e = V.again[j, Y], side_of(V, k, j)
         for i in range(len(y)):
             y[i] = V.held_y[row, i] + (e * V.held_d[row, k, i] if j != RUN else 0.0)
@@ -211,24 +212,23 @@ def error_of(V: Variations, k: int) -> float:
 def try_all(
     V: Variations, scene: Scene, t: float, h: float, k: int, most: float, exact: float
 ) -> float:
-    """Try a step of all motions, of the run alone with k < 0; return its error over what it may be.
+    """Try a step of both sides, or the run with k < 0; return its error over what it may be.
 
-    That is `most` for the run and `exact` for the derivative, which is not tried where the run has
-    failed.
+    That is `most` for motions and `exact` for the derivative; the other side is not tried where the
+    first one has failed.
     """
-    error = try_step(V, scene, t, h, k, RUN) / most
+    error = try_step(V, scene, t, h, k, RUN if k < 0 else MORE) / most
     if k < 0 or error > 1.0:
         return error
-    for j in (MORE, LESS):
-        if not try_step(V, scene, t, h, k, j) < math.inf:
-            return math.inf
+    if not try_step(V, scene, t, h, k, LESS) < math.inf:
+        return math.inf
     return max(error, error_of(V, k) / exact)
 
 
 @jitable
 def take(V: Variations, k: int) -> None:
-    """Let all motions be at the end of the step that was tried."""
-    for j in range(1 if k < 0 else MOTIONS):
+    """Let both sides, or the run with k < 0, be at the end of the step that was tried."""
+    for j in range(RUN if k < 0 else MORE, MORE if k < 0 else MOTIONS):
         for i in range(V.again.shape[2]):
             V.again[j, Y, i], V.again[j, F, i] = V.again[j, END, i], V.again[j, F_END, i]
 
@@ -271,7 +271,7 @@ def reintegrate(
     first: float,
     k: int,
 ) -> bool:
-    """Integrate the run, and both sides of parameter k >= 0, from a kept point to time t."""
+    """Integrate both sides of parameter k, or the run with k < 0, from a kept point to time t."""
     now, h, least = V.held_time[row], first, SHORTEST * (t - V.held_time[row])
     if start(V, scene, row, k) != 0:
         return False
@@ -293,7 +293,7 @@ def reintegrate(
 
 @jitable
 def go_on(V: Variations, scene: Scene, t: float, late: float, k: int) -> None:
-    """Let all motions go on for a little while, or back."""
+    """Let both sides, or the run with k < 0, go on for a little while, or back."""
     if late != 0.0 and try_all(V, scene, t, late, k, math.inf, math.inf) < math.inf:
         take(V, k)
 
