@@ -142,7 +142,8 @@ class Variations(NamedTuple):
     shown: tags.Scratch[F2]  # (P, 2) where that is: SHOWN_AT, SHOWN_LATER
     change: tags.Scratch[F2]  # (MOST_CHANGES, 2) slots that begin or end to touch, at which part
     row: tags.Scratch[F2]  # (4, n) of a row of results: -, y beside it, its f, its derivative
-    # (2,) parts of usual steps of differences, and of the least ones, that those to one side take
+    # (4,) parts of usual steps of differences, of the least ones and of what depths allow that
+    # those to one side take; and of usual ones those to both sides along a step
     one_sided: tags.Constant[F1]
     scale: tags.Constant[F1]  # (n,) usual size of a number of y
     room: tags.Constant[F1]  # (n,) by how much it may be changed for a difference

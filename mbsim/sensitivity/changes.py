@@ -41,7 +41,7 @@ from mbsim.sensitivity.arrays import (
 )
 from mbsim.sensitivity.branches import ANY_BRANCH, branch_of, find_change, tells
 from mbsim.sensitivity.later import add_motion, touch_later
-from mbsim.sensitivity.twin import half_step, set_parameter
+from mbsim.sensitivity.twin import set_parameter, step_along_motion
 
 #: A change is looked for within so many lengths of a step of where the run has it.
 FARTHEST = 100.0
@@ -274,7 +274,7 @@ def step_along(
     is left there.
     """
     begin, until = span
-    e, touched = half_step(V, k), False
+    e, touched = step_along_motion(V, k), False
     begun = goes_on and V.words[ALONG] == 1 and V.smooth[k] == 1
     code = add_motion(V, scene, t, h, begin, k, later)
     if begun:

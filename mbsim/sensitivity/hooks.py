@@ -89,7 +89,15 @@ from mbsim.sensitivity.implicit import implicit_step
 from mbsim.sensitivity.later import UNKNOWN, add, add_motion, give_up, go_on, is_steady, pays
 from mbsim.sensitivity.reintegration import hold, make_sure
 from mbsim.sensitivity.timed import begin_unseen, clear_time, find_hidden, look_behind, make_room
-from mbsim.sensitivity.twin import half_step, is_deep, keep_unit, one_side, reach_of, set_parameter
+from mbsim.sensitivity.twin import (
+    half_step,
+    is_deep,
+    keep_unit,
+    one_side,
+    reach_of,
+    set_parameter,
+    step_along_motion,
+)
 
 #: Where the packed `Variations` stand: where those of MOREAU would, which takes no part in this.
 AT = Hook.STEPPING
@@ -196,7 +204,7 @@ def bent_step(
             return Code.NOT_CONVERGED
     for i in range(len(m.y)):
         V.next[k, i] = V.own[i]
-    e = half_step(V, k)
+    e = step_along_motion(V, k)
     goes_on, later, V.parts[k] = V.words[ALONG] == 1, V.later[k, LAST_UNTIL], 0
     code, V.later[k, LAST_ON] = step_along(V, scene, t, h, k, (0.0, 1.0), goes_on, later)
     if code == 0 and V.words[JOINTS] == 1 and V.close[k] == 0:

@@ -39,19 +39,23 @@ _OWN_STATE = (
     "log/", "audit/", "rows/", "state/memory", "state/before", "state/chattering",
     "work/friction_slope",
 )  # fmt: skip
-#: The error of a step of a derivative may be this part of it, or so many tol.
-ENOUGH, ENOUGH_TOL = 1e-9, 10.0
+#: The error of a step of a derivative may be this part of it, or so many tol; where friction
+#: remembers.
+ENOUGH, ENOUGH_TOL, ENOUGH_OF_MEMORY = 1e-9, 10.0, 30.0
 #: Those of GALPHA, whose steps are many, over those of others: of a step where bodies collide, and
 #: of what an iteration may leave where friction remembers.
 ENOUGH_OFTEN, LEFT_OFTEN = 0.3, 0.1
 #: What an iteration may leave, over the error of a step; where there are contacts, as when they
 #: touch follows from it; of a derivative, where friction remembers: when that sticks and slips
 #: follows from depths, which are far smaller than the model.
-LEFT, LEFT_OF_CONTACTS, LEFT_OF_MEMORY = 0.3, 0.05, 1e-10
-#: What parts of usual steps of differences, and of the least ones, those to one side take.
-#: GALPHA takes many short steps, and looks at how D' changes from one to the next.
-ONE_SIDED, ONE_SIDED_IN_IMPACTS = (3.0, 1.0, 1.0), (1.0, 0.1, 0.3)
-ONE_SIDED_OFTEN, ONE_SIDED_OFTEN_IN_IMPACTS = (0.1, 0.1, 1.0), (1.0, 0.1, 0.1)
+LEFT, LEFT_OF_CONTACTS, LEFT_OF_MEMORY = 0.3, 0.05, 3e-10
+#: What parts of usual steps of differences, of the least ones, and of what depths allow those to
+#: one side take; and of usual steps those to both sides along a step.
+#: GALPHA takes many short steps, and looks at how D' changes from one to the next. Where friction
+#: remembers stiff springs turn rounding of y into forces: more than wider differences are off by.
+ONE_SIDED, ONE_SIDED_IN_IMPACTS = (3.0, 1.0, 1.0, 1.0), (1.0, 0.1, 0.3, 1.0)
+ONE_SIDED_OFTEN, ONE_SIDED_OFTEN_IN_IMPACTS = (0.1, 0.1, 1.0, 1.0), (1.0, 0.1, 0.1, 1.0)
+ONE_SIDED_OF_MEMORY = (100.0, 1.0, 1.0, 30.0)
 #: What is one whole number of each parameter.
 _FLAGS = ("stale", "bend_known", "ready", "bends", "bent", "close")
 #: What is no signal of the motion.
@@ -401,9 +405,10 @@ def _enough(system: System, tol: float, often: bool = False) -> Array:
 
     Steps are many and short where they are taken `often`.
     """
-    enough = max(ENOUGH, ENOUGH_TOL * tol)
     if system.scene.state.memory.shape[1]:
+        enough = max(ENOUGH, ENOUGH_OF_MEMORY * tol)
         return np.array((enough, LEFT_OF_MEMORY * (LEFT_OFTEN if often else 1.0)))
+    enough = max(ENOUGH, ENOUGH_TOL * tol)
     left = enough * (LEFT_OF_CONTACTS if system.contact_ids else LEFT)
     return np.array((enough * (ENOUGH_OFTEN if often and _collides(system) else 1.0), left))
 
@@ -413,6 +418,8 @@ def _one_sided(system: System, often: bool = False) -> Array:
 
     Steps are many and short where they are taken `often`.
     """
+    if system.scene.state.memory.shape[1]:
+        return np.array(ONE_SIDED_OF_MEMORY)
     if _collides(system):
         return np.array(ONE_SIDED_OFTEN_IN_IMPACTS if often else ONE_SIDED_IN_IMPACTS)
     return np.array(ONE_SIDED_OFTEN if often and not system.contact_ids else ONE_SIDED)

@@ -30,7 +30,7 @@ from mbsim.sensitivity.arrays import (
     UNTIL,
     Variations,
 )
-from mbsim.sensitivity.twin import half_step, set_parameter
+from mbsim.sensitivity.twin import set_parameter, widest_step
 
 #: Rows of `Variations.sides`: f before and behind a jump, and between; at either end of what is
 #: searched; by how much the run's f changes there; by how much it does without a jump.
@@ -378,7 +378,7 @@ def make_room(V: Variations, k: int, t: float, h: float) -> None:
     `close` is 1 where some evaluation in the step would be next to one.
     """
     V.shrink[k], V.close[k] = 1.0, 0
-    e = OFF * half_step(V, k)
+    e = OFF * widest_step(V, k)
     begins, ends = e * V.moves[k, FIRST], e * V.moves[k, LAST]
     if begins > 0.0 and t < V.gap[FIRST] + ROOM * begins:
         V.close[k] = 1
@@ -397,7 +397,7 @@ def clear_time(V: Variations, t: float) -> float:
     """
     k = V.words[SET]
     if V.close[k] == 1:
-        e = OFF * half_step(V, k)
+        e = OFF * widest_step(V, k)
         if V.moves[k, LAST] > 0.0:
             t = min(t, V.gap[LAST] - e * V.moves[k, LAST])
         if V.moves[k, FIRST] > 0.0:

@@ -32,6 +32,19 @@ def half_step(V: Variations, k: int) -> float:
 
 
 @jitable
+def step_along_motion(V: Variations, k: int) -> float:
+    """Return by how much parameter k is changed to either side along a step."""
+    return V.shrink[k] * part_of_step(V, k, V.one_sided[3], 1.0, 1.0)
+
+
+@jitable
+def widest_step(V: Variations, k: int) -> float:
+    """Return what of changes of parameter k counts near a jump: a third of those to one side."""
+    part = max(1.0, V.one_sided[3], V.one_sided[0] / 3.0)
+    return V.shrink[k] * part_of_step(V, k, part, 1.0, 1.0)
+
+
+@jitable
 def part_of_step(V: Variations, k: int, part: float, least: float, deep: float) -> float:
     """Return by how much parameter k is changed, with such parts of the usual steps."""
     largest = surely = 1.0 / (STEP * V.size[k])
