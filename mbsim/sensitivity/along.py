@@ -62,6 +62,9 @@ Span = tuple[float, float, int]
 #: Evenly; or the more slowly the nearer to its begin or end, where a touch begins or ends: forces
 #: are powers of depths that are no whole numbers, and bend smoothly over the root of the time.
 EVEN, SOFT_BEGIN, SOFT_END = range(3)
+#: A step of GALPHA that takes so many parts of order 3 would take fewer of order 5; one that is one
+#: part of order 5, which might be so many times as long, is one of order 3.
+MANY, LONGER = 3, 2.5
 #: Parts of a stretch by which its ends are left, until both sides of a difference touch alike.
 NEAREST, FARTHER = 1e-12, 4.0
 #: A difference is no smaller than this part of the usual one.
@@ -277,6 +280,15 @@ def first_part(V: Variations, k: int, way: int, width: float, begun: bool) -> fl
 
 
 @jitable
+def choose_order(V: Variations, k: int, taken: int, width: float) -> None:
+    """Choose the order of parts of the next step of GALPHA from how many were taken in this one."""
+    if V.fifth[k] == 0 and taken >= MANY:
+        V.fifth[k], V.lasted[k] = 1, 0.0
+    elif V.fifth[k] == 1 and taken == 1 and V.lasted[k] > LONGER * width:
+        V.fifth[k], V.lasted[k] = 0, 0.0
+
+
+@jitable
 def integrate(
     V: Variations,
     scene: Scene,
@@ -299,7 +311,8 @@ def integrate(
     width = (end - begin) * h
     if width <= 0.0:
         return 0
-    tries, before, row = 0, 0.0, OF_THIRD if V.words[ALONG] == 1 else OF_FIFTH
+    tries, taken, before = 0, 0, 0.0
+    row = OF_THIRD if V.words[ALONG] == 1 and V.fifth[k] == 0 else OF_FIFTH
     if V.words[ALONG] == 0 and V.words[REMEMBERED] == 0:
         # forces of impacts bend there: what is left of places becomes speeds
         most *= BENT_ENOUGH
@@ -324,12 +337,15 @@ def integrate(
         longer = min(4.0, max(0.1, 0.9 * (most / max(error, 1e-12)) ** (1.0 / ORDER[row])))
         if error <= most or part * width <= max(SHORTEST * h, 1e-15 * abs(t)):
             keep_part(V, k, span, q, part, later, row)
+            taken += 1
             for i in range(len(d)):
                 d[i], w[FIRST, i] = w[STAGE, i], w[FIRST + LAST[row], i]
             q = 1.0 if last else q + part
             if way == EVEN:
                 V.lasted[k] = part * width * longer
         part *= longer
+    if V.words[ALONG] == 1 and way == EVEN:
+        choose_order(V, k, taken, width)
     faster = pace(way, 1.0) * width
     for i in range(len(d)):
         w[FIRST, i] = w[FIRST, i] / faster if faster > 0.0 else 0.0

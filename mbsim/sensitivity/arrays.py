@@ -139,6 +139,7 @@ class Variations(NamedTuple):
     parts: tags.Scratch[I1]
     wide: tags.Scratch[F1]  # (P,) by how much it is changed where a stick is gone over again
     lasted: F1  # (P,) how long such a part may be that is tried first [T]
+    fifth: I1  # (P,) 1 where parts of steps of GALPHA are by the method of order 5
     shown: tags.Scratch[F2]  # (P, 2) where that is: SHOWN_AT, SHOWN_LATER
     change: tags.Scratch[F2]  # (MOST_CHANGES, 2) slots that begin or end to touch, at which part
     row: tags.Scratch[F2]  # (4, n) of a row of results: -, y beside it, its f, its derivative

@@ -57,7 +57,7 @@ ONE_SIDED, ONE_SIDED_IN_IMPACTS = (3.0, 1.0, 1.0, 1.0), (1.0, 0.1, 0.3, 1.0)
 ONE_SIDED_OFTEN, ONE_SIDED_OFTEN_IN_IMPACTS = (0.1, 0.1, 1.0, 1.0), (1.0, 0.1, 0.1, 1.0)
 ONE_SIDED_OF_MEMORY = (100.0, 1.0, 1.0, 30.0)
 #: What is one whole number of each parameter.
-_FLAGS = ("stale", "bend_known", "ready", "bends", "bent", "close")
+_FLAGS = ("stale", "bend_known", "ready", "bends", "bent", "close", "fifth")
 #: What is no signal of the motion.
 _NO_SIGNALS = ("time", "state/", "contact_points/", "events")
 _WHY = {
