@@ -18,7 +18,7 @@ from mbsim.studies.distributions import Numbers, Spread
 from mbsim.studies.outputs import Output, is_peak, no_curve
 from mbsim.studies.records import TIME, Asked, Record, read_asked, read_record
 from mbsim.studies.study import Case, Study, load_toml, read_options, read_paths
-from mbsim.studies.unknown_curves import UnknownCurve, bends_of, read_curves
+from mbsim.studies.unknown_curves import BETWEEN, UnknownCurve, bends_of, read_curves
 
 if TYPE_CHECKING:
     from mbsim.model.elements import Model
@@ -264,8 +264,10 @@ def read_problem(file: str | Path) -> Problem:
     )
     stand_ins = {u.name: u.start for u in unknowns}
     for name, table in tables["parameters"].items():
-        high = table.get("high") if isinstance(table, dict) else None
-        stand_ins.setdefault(name, float(high) if isinstance(high, int | float) else 1.0)
+        given = table if isinstance(table, dict) else {}
+        numbers = [given.get(key) for key in ("high", "start", "low")]
+        finite = [float(x) for x in numbers if isinstance(x, int | float) and math.isfinite(x)]
+        stand_ins.setdefault(name, finite[0] if finite else 1.0)
     return _with_records(problem, asked, stand_ins, faults)
 
 
@@ -300,7 +302,8 @@ def _unknowns(tables: Mapping[str, Any], faults: list[str]) -> list[Unknown]:
         for key in ("low", "high", "start"):
             value = table.get(key, 0.0)
             if type(value) not in (int, float) or not math.isfinite(value):
-                said.append(f"{key} = {value!r}: must be a finite number")
+                why = BETWEEN if value in (math.inf, -math.inf) and key != "start" else ""
+                said.append(f"{key} = {value!r}: must be a finite number{why}")
         scale = table.get("scale", "linear")
         if scale not in ("linear", "log"):
             said.append(f'scale = {scale!r}: must be "linear" or "log"')

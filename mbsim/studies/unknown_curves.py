@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 _KEYS = ("spline", "from", "to", "count", "low", "high", "start", "curvature_sd")
 _NUMBERS = ("from", "to", "low", "high", "curvature_sd")
 _SPLINE = re.compile(r"(\w+)\[(\d+)\]")
+#: Why no bound is infinite.
+BETWEEN = ": the fit moves it between both bounds; give one that it does not reach"
 #: CUBSPL needs four points; more than these are more runs than a fit can be of.
 FEWEST, MOST = 4, 1000
 
@@ -104,7 +106,8 @@ def _faults_of(table: Any) -> list[str]:
     for key in _NUMBERS:
         value = table.get(key, 1.0)
         if type(value) not in (int, float) or not math.isfinite(value):
-            said.append(f"{key} = {value!r}: must be a finite number")
+            why = BETWEEN if value in (math.inf, -math.inf) and key in ("low", "high") else ""
+            said.append(f"{key} = {value!r}: must be a finite number{why}")
     spline, count = table.get("spline"), table.get("count", FEWEST)
     found = _SPLINE.fullmatch(spline) if isinstance(spline, str) else None
     if "spline" in table and (found is None or found[1].lower() != "reference_spline"):

@@ -288,6 +288,30 @@ time_offset = 39.5
 """
 
 
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("low = 0.5, high = inf", "mu_s: high = inf: must be a finite number: the fit moves it"),
+        ("low = -inf, high = 2", "mu_s: low = -inf: must be a finite number: the fit moves it"),
+        ("low = 0.5, high = nan", "mu_s: high = nan: must be a finite number"),
+        ("low = -inf, high = inf", "mu_s: high = inf: must be a finite number: the fit moves it"),
+    ],
+)
+def test_a_bound_that_is_not_finite_is_refused_by_the_study_and_not_by_the_deck(
+    tmp_path, given, said
+):
+    write_record(tmp_path / "x.csv", np.linspace(0.0, 1.0, 11), np.zeros(11))
+    deck = f"[study]\nmodel = {str(BELT)!r}\n"
+    law = 'path = "Force_Contact[301].mu_static"'
+    record = 'file = "x.csv"\ncolumn = "x"\nsignal = "bodies/2/position/x"\nsd = 1\n'
+    text = f"{deck}[parameters]\nmu_s = {{ {law}, {given} }}\n[records.x]\n{record}"
+    (tmp_path / "s.toml").write_text(text)
+    with pytest.raises(ModelError) as error:
+        read_problem(tmp_path / "s.toml")
+    assert said in str(error.value)
+    assert "from --set" not in str(error.value)
+
+
 def test_all_that_is_wrong_is_said_at_once(tmp_path):
     write_record(tmp_path / "x.csv", np.linspace(0.0, 1.0, 11), np.zeros(11))
     (tmp_path / "s.toml").write_text(FAULTY.format(model=BELT))

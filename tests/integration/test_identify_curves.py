@@ -140,6 +140,7 @@ def test_the_command_writes_the_curve(tmp_path):
         ("count = 16\nknots = 3", "count = 16", "unknown knots"),
         ('spline = "Reference_Spline[8]"', 'spline = "Reference_Spline[9]"', r"no .*\[8\]"),
         ("low = 50", "low = -40", "low must be below high"),
+        ("low = -inf", "low = -40", "finite number: the fit moves it between both bounds"),
         ("", "sd = 0.004\n", "sd: needed"),
     ],
 )
