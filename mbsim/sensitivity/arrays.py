@@ -48,8 +48,8 @@ COLLIDES = 33
 JUMPS = 34
 # whether something follows time, so that it may jump
 TIMED = 35
-# whether a user's function may look at the time
-ASKS_TIME = 36
+# whether a user's subroutine acts, which may jump where it likes
+ASKS_USERS = 36
 WORDS = 37
 #: Rows of `Variations.far` and `depth`: either side of a difference, and the run itself.
 UP_SIDE, DOWN_SIDE, OWN = range(3)
@@ -181,4 +181,4 @@ class Variations(NamedTuple):
 
 
 #: Why a derivative is not known from some time on.
-LOST_FAILED, LOST_JUMP, LOST_GRAZING, LOST_LARGE, LOST_WORK = range(1, 6)
+LOST_FAILED, LOST_JUMP, LOST_GRAZING, LOST_LARGE, LOST_WORK, LOST_USER = range(1, 7)

@@ -33,7 +33,7 @@ from mbsim.sensitivity.along import is_too_much, project_end, remember_end, valu
 from mbsim.sensitivity.arrays import (
     ALONG,
     ASKED,
-    ASKS_TIME,
+    ASKS_USERS,
     ATTEMPT,
     BEFORE,
     BENT,
@@ -52,6 +52,7 @@ from mbsim.sensitivity.arrays import (
     LOST_FAILED,
     LOST_JUMP,
     LOST_LARGE,
+    LOST_USER,
     LOST_WORK,
     METHOD,
     MOST,
@@ -85,10 +86,11 @@ from mbsim.sensitivity.events import (
 )
 from mbsim.sensitivity.explicit import explicit_step, fit_beside, fit_path
 from mbsim.sensitivity.generalised import generalised_step, note_along
+from mbsim.sensitivity.hidden import find_hidden
 from mbsim.sensitivity.implicit import implicit_step
 from mbsim.sensitivity.later import UNKNOWN, add, add_motion, give_up, go_on, is_steady, pays
 from mbsim.sensitivity.reintegration import hold, make_sure
-from mbsim.sensitivity.timed import begin_unseen, clear_time, find_hidden, look_behind, make_room
+from mbsim.sensitivity.timed import begin_unseen, clear_time, look_behind, make_room
 from mbsim.sensitivity.twin import (
     half_step,
     is_deep,
@@ -334,10 +336,10 @@ def take_over(V: Variations, t: float, n: int, anew: bool, hops: bool) -> None:
 @jitable
 def lose_hidden(V: Variations, scene: Scene, m: Method, t: float, h: float) -> None:
     """Lose derivatives by what moves a jump in the step that only a user's function knows of."""
-    find_hidden(V, scene, m, t)
+    find_hidden(V, scene, m, h)
     for k in range(len(V.size)):
         if V.reason[k] != 0.0:
-            lose(V, k, t - h, LOST_JUMP)
+            lose(V, k, t - h, LOST_USER)
             V.reason[k] = 0.0
 
 
@@ -359,7 +361,7 @@ def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int
     V.shift[:] = math.nan
     list_asking(V, scene, switched)
     V.reason[:] = 0.0
-    if V.words[ASKS_TIME] == 1:
+    if V.words[ASKS_USERS] == 1:
         lose_hidden(V, scene, m, t, h)
     hops = V.words[TIMED] == 1 and look_for_jumps(V, scene, m, t)
     take_step(V, scene, m, t - h, h)

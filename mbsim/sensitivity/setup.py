@@ -65,6 +65,7 @@ _WHY = {
     at.LOST_JUMP: "forces jump, or what friction keeps; how the time of that moves is unknown",
     at.LOST_GRAZING: "an event is met with next to no speed: its time has no derivative",
     at.LOST_LARGE: "it has grown beyond all bounds: the motion is chaotic",
+    at.LOST_USER: "a user's subroutine jumps, at a time that it keeps to itself and this moves",
     at.LOST_WORK: "it takes far more evaluations than the run itself",
 }
 
@@ -124,7 +125,7 @@ class Sensitivities:
         worth: int = 0,
         start: float = 0.0,
     ) -> None:
-        from mbsim.compile_model.timetable import asks_time, follows_time
+        from mbsim.compile_model.timetable import follows_time
 
         self.system, self.directions, self._tol = system, list(directions), tol
         self.twin = twin_of(system, directions)
@@ -135,7 +136,8 @@ class Sensitivities:
         starts = [self._start(direction, assemble, own) for direction in self.directions]
         self.arrays = self._arrays(y, np.array(starts), tol)
         self.arrays.words[at.WORTH] = worth
-        self.arrays.words[at.ASKS_TIME] = int(asks_time(system))
+        self._users = _users(system)
+        self.arrays.words[at.ASKS_USERS] = int(bool(self._users))
         self.arrays.words[at.TIMED] = int(follows_time(system.scene))
         self.arrays.gap[at.LAST], self.arrays.gap[at.UNTIL] = -math.inf, start
         self._pack()
@@ -367,16 +369,21 @@ class Sensitivities:
                 "steps_along": int(self.arrays.words[at.BENT]),
                 "evaluations": int(self.arrays.words[at.ASKED]),
                 "known_until": float(self.arrays.lost[k]),
-                "why": _WHY.get(int(self.arrays.why[k]), ""),
+                "why": self._why(int(self.arrays.why[k])),
             }
         return found, about
+
+    def _why(self, code: int) -> str:
+        """Return why a derivative is not known, and which subroutines it may be for."""
+        named = f": {', '.join(self._users)}" if code == at.LOST_USER else ""
+        return _WHY.get(code, "") + named
 
     @property
     def lines(self) -> list[str]:
         """What is to be said of derivatives that are not known to the end."""
         return [
             f"warning: sensitivity to {direction.name}: not known from time {lost:.6g} on: "
-            f"{_WHY[int(why)]}"
+            f"{self._why(int(why))}"
             for direction, lost, why in zip(
                 self.directions, self.arrays.lost, self.arrays.why, strict=True
             )
@@ -423,6 +430,14 @@ def _one_sided(system: System, often: bool = False) -> Array:
     if _collides(system):
         return np.array(ONE_SIDED_OFTEN_IN_IMPACTS if often else ONE_SIDED_IN_IMPACTS)
     return np.array(ONE_SIDED_OFTEN if often and not system.contact_ids else ONE_SIDED)
+
+
+def _users(system: System) -> list[str]:
+    """Return the users' subroutines on which forces depend, by element."""
+    found: list[tuple[str, Any]] = [(f"Force_Contact[{id}]", u) for id, u in system.user_laws]
+    found += [(f"Force_Element[{id}]", user) for id, user in system.residuals.items()]
+    found += [(f"{s}[{id}]", user) for (s, id), user in system.subroutines.items() if user.acts]
+    return sorted({f"{element}: {user.name}" for element, user in found})
 
 
 def _part(block: Block, rows: slice) -> Block:

@@ -52,8 +52,6 @@ FOUND, MOST_JUMPS = 1e-10, 16
 #: What changes evenly bends by less than this part of what it changes; f changes by no more than
 #: so many times that without a jump.
 EVENLY, MORE = 0.3, 3.0
-#: A half of a time in which f jumps has more of what it changes by than this part.
-UNEVEN = 0.75
 #: Roundings of a time, over it, in which a step ends before a jump or begins behind it; so many
 #: times that is how far a run hops at most. A jump is soon to come in this part of the time.
 ROUNDINGS, MOST_ROUNDINGS, SOON = 3.3e-16, 8.0, 1e-4
@@ -324,51 +322,6 @@ def change_of(V: Variations, row: int, other: int) -> float:
     for i in range(len(V.scale)):
         largest = max(largest, abs(V.sides[row, i] - V.sides[other, i]) / V.scale[i])
     return largest
-
-
-@jitable
-def hidden_jump(V: Variations, scene: Scene, begin: float, end: float, y: F1) -> float:
-    """Return when f of the run jumps between two times, at y; NaN where it does not.
-
-    By bisection: of what is smooth each half changes by about half of it.
-    """
-    code = evaluate_at(V, scene, begin, y, 0, 0.0, BEGIN)
-    code = code or evaluate_at(V, scene, end, y, 0, 0.0, END)
-    whole = change_of(V, BEGIN, END)
-    if code != 0 or not whole > SMOOTH * max(largest_of(V, BEGIN), largest_of(V, END)):
-        return math.nan
-    while True:
-        middle = 0.5 * (begin + end)
-        if not end - begin > ROUNDINGS * abs(end) or not begin < middle < end:
-            return middle
-        if evaluate_at(V, scene, middle, y, 0, 0.0, MIDDLE) != 0:
-            return math.nan
-        first, last = change_of(V, BEGIN, MIDDLE), change_of(V, MIDDLE, END)
-        if not max(first, last) > UNEVEN * whole:
-            return math.nan
-        if first > last:
-            end = middle
-            copy_row(V, MIDDLE, END)
-        else:
-            begin = middle
-            copy_row(V, MIDDLE, BEGIN)
-        whole = max(first, last)
-
-
-@jitable
-def find_hidden(V: Variations, scene: Scene, m: Method, t: float) -> None:
-    """Find which parameters move a jump in the step to t that nothing tells of: `reason` is 1.
-
-    As of a user's function that looks at the time. Sides of differences have been on either side
-    of it: what derivatives do there is not known.
-    """
-    at = hidden_jump(V, scene, m.memory[TIME], t, m.trial)
-    near = MOST_ROUNDINGS * ROUNDINGS * abs(at)
-    for k in range(len(V.size)):
-        moved = not math.isnan(at) and V.lost[k] == math.inf
-        if moved and not is_alike(V, scene, at - near, at + near, m.trial, k, CHANGE * V.size[k]):
-            V.reason[k] = 1.0
-    set_parameter(V, view(V.words[TWIN], Scene), scene, 0, 0.0)
 
 
 @jitable

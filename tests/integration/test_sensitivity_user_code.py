@@ -131,6 +131,77 @@ def test_numbers_that_are_not_known_are_said_to_be_none(tmp_path):
     assert abs(run["bodies/2/velocity/x"][1] - 2.0) < 1e-6
 
 
+OVER_SPEED = """
+def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):
+    v = (xdot[0] ** 2 + xdot[1] ** 2 + 1e-8) ** 0.5
+    mu = par[0]
+    if v < par[1]:
+        mu = par[2]
+    return [-mu * nforce * xdot[0] / v, -mu * nforce * xdot[1] / v, 0.0]
+"""
+
+
+@pytest.mark.parametrize("integrator", ["DOPRI5", "DOP853", "RADAU5", "GALPHA"])
+def test_a_users_friction_that_jumps_over_the_slip_speed(integrator, tmp_path):
+    # a sphere at rest on its contact slides from 2 to below 1.3; it begins to roll
+    (tmp_path / "laws.py").write_text(OVER_SPEED)
+    file = tmp_path / "ball.xml"
+    law = IMPACT + ' script_name="laws.py"' + FRICTION.replace("0.3,0.01", "0.3,1.3,0.2")
+    low = BALL.format(law=law, more="").replace('pos_z="0.2"', 'pos_z="0.1074"')
+    file.write_text(low)
+    numbers = [f"Force_Contact[301].cff_param_string[{k}]" for k in (1, 2, 3)]
+    run = mbsim.simulate(file, integrator=integrator, tol=1e-8, sensitivity=numbers)
+    for name in numbers[:2]:
+        about = run.parameters[name]
+        assert "a user's subroutine jumps" in about["why"]
+        assert "Force_Contact[301]: CFFSUB" in about["why"]
+        known = about["known_until"]
+        assert 0.0 < known < 0.2
+        assert np.isnan(run.sensitivity(SIGNAL, name)[run["time"] > known]).all()
+    # before the jump nothing is known of the number behind it, and it moves nothing
+    about = run.parameters[numbers[2]]
+    assert about["known_until"] == math.inf
+    found = run.sensitivity("bodies/2/velocity/x", numbers[2])
+    assert (found[run["time"] <= known] == 0.0).all()
+    assert (found[run["time"] > known + 0.03] < -1e-3).all()
+
+
+LOADS_AND_UNLOADS = """
+def CNFSUB(id, time, par, npar, loci, ni, locj, nj, gap, gapdot, gapdotdot, dflag, iflag):
+    if gap >= 0.0:
+        return 0.0
+    if gapdot < 0.0:
+        return par[0] * (-gap) ** 1.5
+    return par[0] * par[1] * (-gap) ** 1.5
+"""
+
+
+@pytest.mark.parametrize("integrator", ["DOPRI5", "DOP853", "RADAU5", "GALPHA"])
+def test_a_users_normal_force_that_jumps_where_the_impact_turns(integrator, tmp_path):
+    (tmp_path / "laws.py").write_text(LOADS_AND_UNLOADS)
+    file = tmp_path / "ball.xml"
+    file.write_text(BALL.format(law=NORMAL + ' script_name="laws.py"', more=""))
+    name = "Body_Rigid[2].mass"
+    run = mbsim.simulate(file, integrator=integrator, tol=1e-8, sensitivity=[name])
+    about, (touch, leave) = run.parameters[name], run["events"]["time"][:2]
+    assert "a user's subroutine jumps" in about["why"]
+    assert touch + 0.01 < about["known_until"] < leave - 0.01
+
+
+@pytest.mark.parametrize("integrator", ["DOPRI5", "DOP853", "RADAU5", "GALPHA"])
+def test_a_users_friction_that_is_steep_but_smooth_is_known(integrator, tmp_path):
+    steep = OVER_SPEED.replace(
+        "    mu = par[0]\n    if v < par[1]:\n        mu = par[2]\n",
+        "    s = 200.0 * (v - par[1])\n    s = s / (1.0 + s * s) ** 0.5\n"
+        "    mu = par[2] + 0.5 * (par[0] - par[2]) * (1.0 + s)\n",
+    )
+    (tmp_path / "laws.py").write_text(steep)
+    file = tmp_path / "ball.xml"
+    law = IMPACT + ' script_name="laws.py"' + FRICTION.replace("0.3,0.01", "0.3,1.3,0.2")
+    file.write_text(BALL.format(law=law, more="").replace('pos_z="0.2"', 'pos_z="0.1074"'))
+    holds(file, "Force_Contact[301].cff_param_string[2]", 1.3, integrator)
+
+
 CLOCK = """
 def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):
     v = (xdot[0] ** 2 + xdot[1] ** 2 + 1e-4) ** 0.5
