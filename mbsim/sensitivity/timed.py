@@ -47,8 +47,12 @@ NEAR, FARTHER, OFTEN = 4.0, 16.0, 4
 ALIKE, SMOOTH, ROUNDED = 1e-4, 1e-8, 1e-13
 #: Behind the begin of a run jumps are looked for within this part of the problem's own time.
 BEHIND_BEGIN = 1e-3
-#: A time is found to this part of what is searched; so many jumps may be in it.
-FOUND, MOST_JUMPS = 1e-10, 16
+#: A time is found to this part of what is searched; so many jumps may be in it. It is searched in
+#: so many pieces: jumps that cancel are seen from between them alone.
+FOUND, MOST_JUMPS, PIECES = 1e-10, 16, 7
+#: Where they cancel in the run there are so many pieces, the shorter the nearer to it, each end of
+#: one so many times as far from it as that before.
+MANY_PIECES, RATIO = 81, 1.1
 #: What changes evenly bends by less than this part of what it changes; f changes by no more than
 #: so many times that without a jump.
 EVENLY, MORE = 0.3, 3.0
@@ -120,6 +124,37 @@ def is_alike(
 
 
 @jitable
+def bend_at(V: Variations, scene: Scene, t: float, y: F1, k: int, e: float, row: int) -> int:
+    """Write f on both sides of parameter k less twice that of the run, which is left in MIDDLE."""
+    sides, code = V.sides, 0
+    sides[row, :] = 0.0
+    for side in range(3):
+        x, weight = (e, 1.0) if side == 0 else (-e, 1.0) if side == 1 else (0.0, -2.0)
+        code = code or evaluate_at(V, scene, t, y, k, x, MIDDLE)
+        for i in range(len(y)):
+            sides[row, i] += weight * sides[MIDDLE, i]
+    return code
+
+
+@jitable
+def is_beside(
+    V: Variations, scene: Scene, near: float, far: float, y: F1, k: int, e: float
+) -> bool:
+    """Return whether both sides of parameter k lie about the run at two times alike.
+
+    They do not where jumps that cancel in the run are at different times on a side.
+    """
+    code = bend_at(V, scene, far, y, k, e, END) or bend_at(V, scene, near, y, k, e, BEGIN)
+    most = largest_of(V, MIDDLE)
+    for i in range(len(y)):
+        size = abs(V.sides[MIDDLE, i])
+        off = abs(V.sides[BEGIN, i] - V.sides[END, i])
+        if not off <= SMOOTH * size + 4.0 * noise(V, i, size, most):
+            return False
+    return code == 0
+
+
+@jitable
 def add_drift(V: Variations, scene: Scene, far: float, near: float, y: F1, row: int) -> bool:
     """Add to DRIFT by how much f of the run changes between two times; return if it does evenly.
 
@@ -171,28 +206,43 @@ def find_jump(
 
 
 @jitable
+def end_of(piece: int, pieces: int, begin: float, end: float) -> float:
+    """Return where a piece of what is searched ends, the first one being 1."""
+    if pieces == PIECES:
+        return begin + piece / pieces * (end - begin)
+    half, about = (pieces - 1) // 2, 0.5 * (begin + end)
+    if piece == pieces:
+        return end
+    away = piece if piece <= half else pieces - piece
+    return about + (0.5 if piece > half else -0.5) * (end - begin) * RATIO ** (-float(away))
+
+
+@jitable
 def add_jumps(
-    V: Variations, scene: Scene, begin: float, end: float, about: float, y: F1, k: int, e: float
+    V: Variations, scene: Scene, begin: float, end: float, pieces: int, y: F1, k: int, e: float
 ) -> float:
-    """Add what the jumps of a side make of derivative k, by how much later than `about` they are.
+    """Add what the jumps of a side make of derivative k, by how much later than midway they are.
 
     Return the largest such time, NaN where they are not found.
     """
-    sides, left, farthest = V.sides, begin, 0.0
+    sides, left, farthest, found = V.sides, begin, 0.0, 0
+    about = 0.5 * (begin + end)
     code = evaluate_at(V, scene, begin, y, k, e, BEFORE)
-    code = code or evaluate_at(V, scene, end, y, k, e, END)
-    for _ in range(MOST_JUMPS):
-        if code == 0 and not differs(V, BEFORE, END):
-            return farthest
-        left, right = find_jump(V, scene, left, end, FOUND * (end - begin), y, k, e)
-        if code != 0 or not right > left:
-            return math.nan
-        later = 0.5 * (left - about) + 0.5 * (right - about)
-        farthest, left = max(farthest, abs(later)), right
-        for i in range(len(y)):
-            V.fall[k, i] -= 0.5 / e * later * (sides[BEHIND, i] - sides[BEFORE, i])
-            sides[BEFORE, i] = sides[BEHIND, i]
-    return math.nan
+    for piece in range(1, pieces + 1):
+        until = end_of(piece, pieces, begin, end)
+        code = code or evaluate_at(V, scene, until, y, k, e, END)
+        while code == 0 and differs(V, BEFORE, END):
+            left, right = find_jump(V, scene, left, until, FOUND * (end - begin), y, k, e)
+            found += 1
+            if not right > left or found > MOST_JUMPS:
+                return math.nan
+            later = 0.5 * (left - about) + 0.5 * (right - about)
+            farthest, left = max(farthest, abs(later)), right
+            for i in range(len(y)):
+                V.fall[k, i] -= 0.5 / e * later * (sides[BEHIND, i] - sides[BEFORE, i])
+                sides[BEFORE, i] = sides[BEHIND, i]
+        left = until
+    return farthest if code == 0 else math.nan
 
 
 @jitable
@@ -204,8 +254,14 @@ def find_fall(
     Return whether that is known, and how far the times of jumps move, over the parameter.
     """
     about, gap, e = 0.5 * (before + behind), behind - before, CHANGE * V.size[k]
-    if is_alike(V, scene, before - gap, behind + gap, y, k, e):
+    wide = max(NEAR * e * abs(about) / V.size[k], 4.0 * gap)
+    alike = is_alike(V, scene, before - gap, behind + gap, y, k, e)
+    cancels = alike and change_of(V, BEGIN, END) <= SMOOTH * largest_of(V, END)
+    alike = alike and is_beside(V, scene, before - gap, before - wide, y, k, e)
+    alike = alike and is_beside(V, scene, behind + gap, behind + wide, y, k, e)
+    if alike and not cancels:
         return True, 0.0
+    pieces = MANY_PIECES if cancels else PIECES
     for _ in range(TRIES):
         wide = max(NEAR * e * abs(about) / V.size[k], 4.0 * gap)
         known = is_alike(V, scene, before - wide, behind + wide, y, k, e)
@@ -217,11 +273,11 @@ def find_fall(
         V.sides[DRIFT, :] = 0.0
         if known and add_drift(V, scene, begin, before, y, BEGIN):
             if add_drift(V, scene, end, behind, y, END):
-                up = add_jumps(V, scene, begin, end, about, y, k, e)
-                down = add_jumps(V, scene, begin, end, about, y, k, -e)
+                up = add_jumps(V, scene, begin, end, pieces, y, k, e)
+                down = add_jumps(V, scene, begin, end, pieces, y, k, -e)
                 return math.isfinite(up + down), max(up, down) / e
         e *= LESS
-    return False, 0.0
+    return alike, 0.0
 
 
 @jitable

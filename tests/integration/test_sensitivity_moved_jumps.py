@@ -73,6 +73,13 @@ def is_as(deck, signal, integrator, allowed, tol=1e-9):
         "IF(SIN(40*TIME-VARVAL(1)):-5,0,10)",
         # several at once, of which one does not move
         "IF(TIME-VARVAL(1):0,0,10)-IF(TIME-VARVAL(1)**2/0.4987:0,0,4)+IF(TIME-0.4987:0,0,1)",
+        # several at once that cancel, of which one moves, or each as fast as it likes, or all alike
+        "IF(TIME-VARVAL(1):0,0,10)-IF(TIME-0.4987:0,0,10)",
+        "IF(TIME-VARVAL(1):0,0,10)-IF(TIME-VARVAL(1)**2/0.4987:0,0,10)",
+        "IF(TIME-VARVAL(1):0,0,10)-IF(TIME-1.2*VARVAL(1)+0.2*0.4987:0,0,10)",
+        "IF(TIME-VARVAL(1):0,0,10)-IF(TIME-(0.9974-VARVAL(1)):0,0,10)",
+        "IF(TIME-VARVAL(1):0,0,10)-2*IF(TIME-0.4987:0,0,10)+IF(TIME-2*VARVAL(1)+0.4987:0,0,10)",
+        "IF(TIME-VARVAL(1):0,0,VARVAL(1))-IF(TIME-VARVAL(1):0,0,0.4987)",
         # one that does not move at all
         "VARVAL(1)*IF(TIME-0.3:0,0,10)",
     ],
