@@ -63,6 +63,8 @@ COUNT, SURE, LIST = range(3)
 #: Number of `Variations.line`: how far from the ends of a stretch of a step both sides of a
 #: difference touch alike, over its length.
 APART = 1
+#: How fast f changed in the last step, in usual sizes.
+USUAL_CHANGE = 2
 #: Numbers of a row of `Variations.later`: at the begin of the last step, behind it.
 LAST_UNTIL, LAST_ON = range(2)
 #: Numbers of a row of `Variations.shown`: part of the last step, `later` there.
@@ -121,7 +123,7 @@ class Variations(NamedTuple):
     reach: F1  # (P,) by how much a parameter may be changed for depths, 0: not known
     odd: tags.Scratch[I2]  # (2, ns) 1 where friction asks for another branch beside the run
     depth: tags.Scratch[F2]  # (3, ns) how deep slots are at the end of a step, rows as of `far`
-    # (2,) length of the straight line [T]; APART
+    # (3,) length of the straight line [T]; APART, USUAL_CHANGE
     line: tags.Scratch[F1]
     # (P, ns + 1) by how much slots change their branch later, by the parameter; what else does last
     shift: tags.Scratch[F2]

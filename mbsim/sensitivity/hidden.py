@@ -13,7 +13,7 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.address import view
 from mbsim.core.jitable import jitable
 from mbsim.integrators.scheme import TIME, Method
-from mbsim.sensitivity.arrays import ASKED, F_BEFORE, LOST_USER, TWIN, Variations
+from mbsim.sensitivity.arrays import ASKED, F_BEFORE, LOST_USER, TWIN, USUAL_CHANGE, Variations
 from mbsim.sensitivity.timed import (
     BEFORE,
     BEGIN,
@@ -31,17 +31,20 @@ from mbsim.sensitivity.twin import half_step, set_parameter
 #: What f changes by is no jump below this part of it; a half of a stretch in which it jumps has
 #: more of what it changes by than UNEVEN; a side changes as the run does up to ALIKE of that.
 SMOOTH, UNEVEN, ALIKE = 1e-8, 0.6, 1e-2
+#: f that changes no faster than so many times as fast as in the step before does not jump: a step
+#: over a jump is a short one.
+FASTER = 1.3
 #: How short a part of a step a jump is found in, and how many roundings of a time.
 FOUND, ROUNDINGS = 1e-10, 4e-15
 
 
 @jitable
-def touching(scene: Scene) -> int:
-    """Return a number that tells what touches from what else does."""
-    hit, sum = scene.work.hit, 0
-    for j in range(hit[len(hit) - 1]):
-        sum += 1 + hit[j]
-    return sum
+def same_touch(scene: Scene) -> bool:
+    """Return whether the same touches at both ends of the step."""
+    for s in range(len(scene.work.touching)):
+        if scene.work.touching[s] != scene.state.touching[s]:
+            return False
+    return True
 
 
 @jitable
@@ -64,17 +67,17 @@ def ask_within(
 @jitable
 def jump_within(V: Variations, scene: Scene, m: Method, h: float) -> float:
     """Return at which part of the step f of the run jumps while the same touches, NaN: nowhere."""
-    twin = view(V.words[TWIN], Scene)
-    begin, end = 0.0, 1.0
+    begin, end, before = 0.0, 1.0, V.line[USUAL_CHANGE]
     least = max(FOUND, ROUNDINGS * abs(m.memory[TIME]) / h)
-    code = ask_within(V, scene, m, h, begin, 0, 0.0, BEGIN)
-    same = touching(twin)
-    code = code or ask_within(V, scene, m, h, end, 0, 0.0, END)
-    if code != 0 or touching(twin) != same:
-        return math.nan
+    for i in range(len(m.y)):
+        V.sides[BEGIN, i], V.sides[END, i] = m.k[0, i], V.jump[F_BEFORE, i]
     whole, none = change_of(V, BEGIN, END), SMOOTH * max(largest_of(V, BEGIN), largest_of(V, END))
+    V.line[USUAL_CHANGE] = whole / h
+    if not same_touch(scene) or whole <= FASTER * before * h:
+        return math.nan
     while whole > none:
         if end - begin <= least:
+            V.line[USUAL_CHANGE] = before
             return 0.5 * (begin + end)
         middle = 0.5 * (begin + end)
         if ask_within(V, scene, m, h, middle, 0, 0.0, MIDDLE) != 0:

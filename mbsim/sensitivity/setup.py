@@ -204,7 +204,7 @@ class Sensitivities:
             reach=np.zeros(count),
             depth=np.zeros((3, shape[0])),
             odd=np.zeros((2, shape[0]), dtype=np.int64),
-            line=np.zeros(2),
+            line=np.zeros(3),
             shift=np.zeros((count, shape[0] + 1)),
             times=np.zeros((count, shape[0] + 1, 3)),
             asks=np.zeros(shape[0] + 1, dtype=np.int64),
