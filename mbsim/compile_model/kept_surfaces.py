@@ -1,9 +1,10 @@
-"""Packed surfaces that are kept: in this process, and of large meshes in the cache folder.
+"""Packed surfaces that are kept: in this process, and in the cache folder for later ones.
 
-To pack a mesh of 10,000 triangles takes a second; a sweep would do so for each of its runs. A file
-is named after the mesh and after the project files that pack it, and holds a digest of itself: what
-is damaged, of another version or written by a process whose files were changed meanwhile is packed
-anew.
+To pack a mesh of 10,000 triangles takes a second; a sweep would do so for each of its runs. The
+smallest gain as well: a box is packed in a tenth of a second with a layer and in milliseconds
+without, and read in a tenth of one (tests/bench/mesh_packing.py). A file is named after the mesh
+and after the project files that pack it, and holds a digest of itself: what is damaged, of another
+version or written by a process whose files were changed meanwhile is packed anew.
 """
 
 from __future__ import annotations
@@ -28,10 +29,10 @@ from mbsim.model.packing import pack_mesh
 
 #: Numbers that a process keeps at most: those that were asked for last.
 MOST_NUMBERS = 16_000_000
-#: Triangles from which a file is written: of fewer it takes as long to read.
-FEWEST_TRIANGLES = 50
 #: Bytes of all files at most; those that were asked for last stay.
 MOST_BYTES = 2**29
+#: Bytes that a file counts for at least, so that the folder is soon looked through: 2048 files.
+LEAST_BYTES = 2**18
 
 _here: OrderedDict[str, Array] = OrderedDict()
 
@@ -45,7 +46,7 @@ def kept_surface(vertices: Array, faces: Faces, layered: bool) -> Array:
     found = _here.pop(name, None)
     if found is None:
         make = functools.partial(pack_mesh, vertices, faces, layered)
-        found = _in_files(name, make) if len(faces) >= FEWEST_TRIANGLES else make()
+        found = _in_files(name, make)
         found.flags.writeable = False
     _here[name] = found
     while sum(map(len, _here.values())) > MOST_NUMBERS:
@@ -99,10 +100,15 @@ def _read(path: Path) -> Array | None:
 
 
 def _write(path: Path, packed: Array) -> None:
-    """Write a file whole or not at all, and remove those that were not asked for longest."""
+    """Write a file whole or not at all, and remove those that were not asked for longest.
+
+    One that alone is larger than all may be is not written: it would cost all others.
+    """
+    numbers = packed.astype("<f8").tobytes()
+    if len(numbers) > MOST_BYTES:
+        return
     folder = path.parent
     folder.mkdir(mode=0o700, exist_ok=True)
-    numbers = packed.astype("<f8").tobytes()
     handle, temporary = tempfile.mkstemp(dir=folder)
     try:
         with os.fdopen(handle, "wb") as file:
@@ -111,11 +117,21 @@ def _write(path: Path, packed: Array) -> None:
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
-    files = [(found.stat(), found) for found in folder.iterdir()]
-    total = sum(stat.st_size for stat, _ in files)
-    for stat, found in sorted(files, key=lambda one: one[0].st_mtime):
+    _remove_oldest(path)
+
+
+def _remove_oldest(latest: Path) -> None:
+    """Remove the files beside `latest` that were not asked for longest, down to `MOST_BYTES`."""
+    with os.scandir(latest.parent) as entries:
+        stats = [(entry.stat(), entry) for entry in entries]
+    files = [(stat.st_mtime, max(stat.st_size, LEAST_BYTES), entry) for stat, entry in stats]
+    total = sum(size for _, size, _ in files)
+    if total <= MOST_BYTES:
+        return
+    for _, size, entry in sorted(files, key=lambda one: one[0]):
         if total <= MOST_BYTES:
             break
-        if found != path:
-            found.unlink(missing_ok=True)
-            total -= stat.st_size
+        if entry.name != latest.name:
+            with contextlib.suppress(OSError):
+                os.unlink(entry.path)
+                total -= size

@@ -1,4 +1,4 @@
-"""Packed surfaces are made once: in a process, and of large meshes once for all later ones."""
+"""Packed surfaces are made once: in a process, and for later ones in files."""
 
 from __future__ import annotations
 
@@ -57,14 +57,15 @@ def test_a_mesh_is_packed_once_in_a_process(made: list[int]) -> None:
     assert made[4:] == [36]
 
 
-def test_a_large_mesh_is_packed_once_for_later_processes(made: list[int], tmp_path: Path) -> None:
-    small, large = torus(3), torus(12)
-    first = kept_surface(*large, True)
-    kept_surface(*small, True)
+@pytest.mark.parametrize("sides", [3, 12])
+def test_a_mesh_is_packed_once_for_later_processes(
+    made: list[int], tmp_path: Path, sides: int
+) -> None:
+    first = kept_surface(*torus(sides), True)
     assert len(files(tmp_path)) == 1
     kept_surfaces.forget()
-    again = kept_surface(*large, True)
-    assert made == [576, 36]
+    again = kept_surface(*torus(sides), True)
+    assert made == [4 * sides**2]
     assert again is not first
     assert np.array_equal(again, first)
 
@@ -125,6 +126,7 @@ def test_what_was_asked_for_last_stays(
     size = len(kept_surface(*meshes[0], True))
     monkeypatch.setattr(kept_surfaces, "MOST_NUMBERS", 2.5 * size)
     monkeypatch.setattr(kept_surfaces, "MOST_BYTES", 2.5 * 8 * size)
+    monkeypatch.setattr(kept_surfaces, "LEAST_BYTES", 0)
     kept_surface(*meshes[1], True)
     old = files(tmp_path)
     for age, path in enumerate(old):
@@ -135,6 +137,28 @@ def test_what_was_asked_for_last_stays(
     assert len(left) == 2
     assert old[0] not in left
     assert made == [576, 576, 576]
+
+
+def test_a_mesh_that_is_larger_than_all_files_may_be_costs_no_other(
+    made: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    size = len(kept_surface(*torus(3), True))
+    small = files(tmp_path)
+    monkeypatch.setattr(kept_surfaces, "MOST_BYTES", 8 * size)
+    monkeypatch.setattr(kept_surfaces, "LEAST_BYTES", 0)
+    assert len(kept_surface(*torus(12), True)) > size
+    assert len(small) == 1
+    assert files(tmp_path) == small
+
+
+def test_small_files_are_few(
+    made: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # each counts for LEAST_BYTES, however small it is
+    monkeypatch.setattr(kept_surfaces, "MOST_BYTES", 3 * kept_surfaces.LEAST_BYTES)
+    for scale in range(1, 7):
+        kept_surface(scale * torus(3)[0], torus(3)[1], True)
+    assert len(files(tmp_path)) == 3
 
 
 def test_what_a_run_gets_is_its_own(made: list[int]) -> None:
