@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from mbsim.core.golden import minimum
 from mbsim.geometry.mesh_surface import SLOPE, Array, Indices, Surface
 
 #: A direction that is no face's normal must overlap less than one by this part.
@@ -172,24 +173,6 @@ def _patch_under(
     return least, normal
 
 
-def _least(f: Any, reach: float) -> tuple[float, float]:
-    """Return (f, x) of the least f(x) within +-reach, by golden sections."""
-    part = 0.5 * (np.sqrt(5.0) - 1.0)
-    low, high = -reach, reach
-    a, b = high - part * (high - low), low + part * (high - low)
-    fa, fb = f(a), f(b)
-    while high - low > 1e-9:
-        if fa < fb:
-            high, b, fb = b, a, fa
-            a = high - part * (high - low)
-            fa = f(a)
-        else:
-            low, a, fa = a, b, fb
-            b = low + part * (high - low)
-            fb = f(b)
-    return min((fa, a), (fb, b))
-
-
 def _settled(
     surface: Surface, vertex: int, points: Array, shape: Any, n: Array
 ) -> tuple[float, Array]:
@@ -229,7 +212,7 @@ def _turned(points: Array, shape: Any, n: Array, e: Array, on_edge: bool) -> tup
                 d = turned(angle)
                 return float((points @ d).max()) - _lowest(shape, d)
 
-            depth, angle = _least(overlap, 5.0 * SLOPE)
+            depth, angle = minimum(overlap, -5.0 * SLOPE, 5.0 * SLOPE, absolute=1e-9)
             n = turned(angle)
             n, e = n / np.linalg.norm(n), e if on_edge else e - (e @ n) * n
     return depth, n

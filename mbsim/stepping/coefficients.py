@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mbsim.core.golden import minimum
 from mbsim.errors import ModelError
 from mbsim.laws.abi import (
     FRICTION_INPUTS,
@@ -154,8 +155,13 @@ class Coefficients:
         peak = int(mu.argmax())
         top = float(mu[peak])
         if 0.0 < top and 0 < peak < ASKED - 1:
-            top = highest(lambda v: self._asked(c, contact, v), speeds[peak - 1], speeds[peak + 1])
-            top = max(top, float(mu[peak]))
+            least, _ = minimum(
+                lambda v: -self._asked(c, contact, v),
+                speeds[peak - 1],
+                speeds[peak + 1],
+                relative=ONE_SPEED,
+            )
+            top = max(-least, top)
         first = int(np.argmax(mu >= NEARLY * top)) if top > 0.0 else 0
         if top > 0.0 and speeds[first] > usual:
             raise self._refuse(
@@ -246,26 +252,6 @@ class Coefficients:
         if contact.ref_velocity is not None:
             return float(contact.ref_velocity), mass
         return self._speed(c), mass
-
-
-def highest(asked: Callable[[float], float], low: float, high: float) -> float:
-    """Return the largest coefficient at speeds from `low` to `high`, between which it has a peak.
-
-    By golden sections (J. Kiefer, Proc. Amer. Math. Soc. 4 (1953) 502).
-    """
-    part = 0.5 * (math.sqrt(5.0) - 1.0)
-    left, right = high - part * (high - low), low + part * (high - low)
-    at_left, at_right = asked(left), asked(right)
-    while high - low > ONE_SPEED * high:
-        if at_left >= at_right:
-            high, right, at_right = right, left, at_left
-            left = high - part * (high - low)
-            at_left = asked(left)
-        else:
-            low, left, at_left = left, right, at_right
-            right = low + part * (high - low)
-            at_right = asked(right)
-    return max(at_left, at_right)
 
 
 def knots_of(asked: Callable[[float], float], samples: Knots, straight: float) -> Knots:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mbsim.core.blend import step
-from mbsim.stepping.coefficients import highest, knots_of
+from mbsim.stepping.coefficients import knots_of
 
 SAMPLES = np.geomspace(0.1, 1e3, 320)
 LAWS: dict[str, Callable[[float], float]] = {
@@ -35,9 +35,3 @@ def test_knots_say_what_the_law_says(name: str) -> None:
     assert abs(off).max() < 1e-5
     assert len(knots) < 700
     assert (np.diff(knots[:, 0]) > 0.0).all()
-
-
-def test_the_highest_coefficient_is_found_between_samples() -> None:
-    """Of a round top and of one that is a corner."""
-    assert highest(lambda v: 0.5 - (v - 0.123) ** 2, 0.1, 0.2) == pytest.approx(0.5, abs=1e-12)
-    assert highest(lambda v: 0.5 - abs(v - 0.123), 0.1, 0.2) == pytest.approx(0.5, abs=1e-9)
