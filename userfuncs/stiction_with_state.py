@@ -14,6 +14,10 @@ The damper lets it come to rest. It has no more than R, what the spring leaves o
 nothing in slip: a damper that came at once where slip that turns comes to stick would make the
 force jump there.
 
+The built-in STICTION has another s: 1 where mu N has room for all of c v, else what it has room
+for, and both times 4 r (2 - 4 r) where r = R/(mu N) is less than a quarter. They differ where c v
+is not small against R.
+
 Why X alone cannot do it: X says where the surfaces are, not how they came there. A force
 -clip(k X, mu N) is that of a spring of limited strength: after a reversal it goes on pulling
 towards X = 0, along the motion, and gives back all that it took. Friction turns against the new
