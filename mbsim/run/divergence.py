@@ -1,10 +1,13 @@
 """When a run makes no progress: a motion that runs off to a pole is told, not followed for hours.
 
-A watch looks every `core.problem.WATCH_EVERY` steps, and gives up where either holds:
+A watch looks every `core.problem.WATCH_EVERY` steps, and gives up where one of these holds:
 
 * the last STALLED steps were on average shorter than a SLIVER of the time that has passed;
 * at the pace of the last FEW steps HOPELESS more are to come, while the fastest body is FAST times
-  the model's own speed V and GROWTH times as fast as when a hundredth of the time was left out.
+  the model's own speed V and GROWTH times as fast as when a hundredth of the time was left out;
+* at the pace of the last FEW steps, and at that of the FEW before, ENDLESS more are to come, and
+  ROWLESS before the next row: a day without a row at a step a microsecond. The motion itself is so
+  fast: a spin, a swing on a spring, a force that changes with time.
 """
 
 from __future__ import annotations
@@ -15,14 +18,26 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED, WHOLE, WORST_BODY
+from mbsim.arrays.codes import (
+    APPLIED_FORCE,
+    APPLIED_TORQUE,
+    SCALE_LENGTH,
+    SCALE_SPEED,
+    STORED_ENERGY,
+    WHOLE,
+    WORST_BODY,
+)
 from mbsim.errors import SolverError
+from mbsim.model.names import element_name
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
 
 STALLED, SLIVER = 200_000, 1e-9
 FEW, HOPELESS, FAST, GROWTH = 20_000, 1e7, 1e6, 100.0
+ENDLESS, ROWLESS = 1e11, 1e9
+#: Steps are the same where their mean is this many times that of them and as many before, at most.
+STEADY = 1.2
 #: Part of the time that has passed over which speeds are compared.
 LATELY = 0.01
 _NAMES = ("displacement", "velocity", "acceleration")
@@ -48,8 +63,8 @@ def next_budget(budget: int, done: int, elapsed: float) -> int:
 class Pace:
     """Steps, time and speed of one Simulate, as far back as they are asked for."""
 
-    def __init__(self, start: float, end: float) -> None:
-        self.start, self.end = start, end
+    def __init__(self, start: float, end: float, interval: float) -> None:
+        self.start, self.end, self.interval = start, end, interval  # of rows
         self.seen: deque[tuple[int, float, float]] = deque()
 
     def saved(self) -> dict[str, Any]:
@@ -74,9 +89,22 @@ class Pace:
             before = next((v for _, when, v in reversed(self.seen) if when <= long_ago), 0.0)
             if speed > max(FAST * system.scene.world.scale[SCALE_SPEED], GROWTH * before):
                 _give_up(system, y, t, pace, "the motion leaves all bounds", "")
+        if pace is not None and self._is_endless(pace, t):
+            _give_up(system, y, t, pace, "the run would take days", _hurried(system, y, t))
         pace = self._pace(STALLED)
         if pace is not None and pace < SLIVER * passed:
             _give_up(system, y, t, pace, "the run would not end", _pressed(system))
+
+    def _is_endless(self, pace: float, t: float) -> bool:
+        """Return whether so many steps are to come that it is no matter of waiting.
+
+        Steps that grow say nothing yet: what dies out may begin with short ones.
+        """
+        both = self._pace(2 * FEW)
+        if both is None or pace > STEADY * both:
+            return False
+        step = max(pace, both, 1e-300)
+        return (self.end - t) / step > ENDLESS and self.interval / step > ROWLESS
 
     def _is_old(self, seen: tuple[int, float, float], steps: int, t: float) -> bool:
         return seen[0] <= steps - STALLED and seen[1] <= t - LATELY * (t - self.start)
@@ -120,6 +148,25 @@ def _pressed(system: System) -> str:
         return ""
     by = f"Force_Contact[{system.contact_ids[contact]}]"
     return f"{system.body_name(body)} asks for them, on which {by} acts"
+
+
+def _hurried(system: System, y: Any, t: float) -> str:
+    """Return who asks for steps that are too many: a contact, or what moves and pushes most."""
+    from mbsim.results.elements import GROUPS
+
+    pressed = _pressed(system)
+    if pressed:
+        return pressed
+    table = np.abs(system.scene.work.applied)
+    sizes = table[:, APPLIED_FORCE:APPLIED_TORQUE].max(axis=1, initial=0.0)
+    torques = table[:, APPLIED_TORQUE:STORED_ENERGY].max(axis=1, initial=0.0)
+    sizes = np.maximum(sizes, torques / system.scene.world.scale[SCALE_LENGTH])
+    said = _culprit(system, y, t)
+    if not len(sizes) or not sizes.max() > 0.0:
+        return said
+    statement, id = system.applied[int(sizes.argmax())]
+    name = element_name(system.model.file, GROUPS[statement].title, id)
+    return f"{said}, and {name} pushes most, with {sizes.max():.3g}"
 
 
 def _culprit(system: System, y: Any, t: float) -> str:

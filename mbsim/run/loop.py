@@ -80,7 +80,7 @@ class Runner:
         self.method.counts[scheme.NEXT_WATCH] = 0
         self.commands = Commands(system, settings, changes or [])
         self.stage = 0  # which Simulate
-        self.pace = Pace(start, start)  # of that one
+        self.pace = Pace(start, start, 0.0)  # of that one
         self.sensing = Sensing(system, self.method, log, tell)
         self.loop_seconds = 0.0
         self.most_evaluations: int | None = None  # of a rerun that verifies
@@ -191,7 +191,7 @@ class Runner:
     def _pace(self) -> Pace:
         """Return what looks whether the current Simulate gets anywhere."""
         simulation = self.settings.stages[self.stage].simulation
-        return Pace(simulation.start_time, simulation.end_time)
+        return Pace(simulation.start_time, simulation.end_time, simulation.print_interval)
 
     def run(self, progress: Progress | None, resumed: bool) -> None:
         """Run all Simulate statements from the current stage on."""
