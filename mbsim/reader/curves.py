@@ -23,7 +23,7 @@ _APART = 1e-9
 
 def _build_curve(entry: Entry) -> None:
     """Add a curve; of one that a matrix gives the points come when all has been read."""
-    by = [name for name in ("matrix_id", "points") if entry.given(name)]
+    by = entry.one_of(("matrix_id", "points"))
     if len(by) != 1:
         entry.fault('needs its points once: as text, or by matrix_id="..."')
         return

@@ -229,6 +229,11 @@ class Entry:
         given = self._attributes
         return [name for name in names if name in given]
 
+    def one_of(self, names: Iterable[str]) -> list[str]:
+        """Return those of attributes that say the same: where --set gives some, only these."""
+        given = self.those(names)
+        return [name for name in given if self._attributes[name].origin] or given
+
     def fault(self, message: str, attribute: str = "") -> None:
         """Add a fault, at the attribute's line and quoting its value where one is named."""
         self.fault_at(self._line(attribute), self._quote(attribute) + message)
@@ -346,9 +351,9 @@ class Entry:
         text = self.statement.text
         if self.node.text and text and text not in self._attributes:
             self._attributes[text] = Attribute(text, self.node.text, self.node.line)
-        elif self.node.text and text:
+        elif self.node.text and text and not self._attributes[text].origin:
             self.fault("given as text of the element too; must be one of both", text)
-        elif self.node.text:
+        elif self.node.text and not text:
             self.fault(f"text {_short(self.node.text)!r} inside the element is not accepted")
 
 

@@ -85,15 +85,20 @@ def _from_file(entry: Entry) -> Numbers | None:
     return tuple(found)
 
 
+#: How a spline's points are given, by the attributes that give them.
+_FORMS = {"x": "x", "y": "x", "points": "points", "file": "file"}
+
+
 def _build_spline(entry: Entry) -> None:
     """Add a spline, from x and y or from a table of one row for each x."""
-    given = [name for name in ("x", "points", "file") if entry.given(name)]
+    given = {_FORMS[name] for name in entry.one_of(_FORMS)}
     if len(given) != 1 or entry.given("x") != entry.given("y"):
         entry.fault('needs its points once: as text, by file="...", or by x="..." and y="..."')
         return
     z = entry.get("z", ())
     curves = max(1, len(z))
-    if entry.given("x"):
+    (name,) = given
+    if name == "x":
         x, y = entry.get("x"), entry.get("y")
         if x is None or y is None:
             return
@@ -104,7 +109,6 @@ def _build_spline(entry: Entry) -> None:
         rows = [y[k * len(x) : (k + 1) * len(x)] for k in range(curves)]
         add_spline(entry, x, rows, z, "x", "y")
         return
-    name = given[0]
     table = _from_file(entry) if name == "file" else entry.get("points")
     if table is None:
         return

@@ -250,3 +250,36 @@ def test_faults_of_adams_tables(tmp_path, old, new, said):
     with pytest.raises(DeckError) as caught:
         read_model(tmp_path / "deck.adm")
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        'id="1"> 0 5  1 6  2 7  3 8 </Reference_Spline',
+        'id="1" x="0 1 2 3" y="5 6 7 8"/',
+        'id="1" file="points.csv"/',
+    ],
+)
+def test_points_that_an_option_gives_replace_those_of_the_deck(tmp_path, said):
+    (tmp_path / "points.csv").write_text("0 5\n1 6\n2 7\n3 8\n")
+    (tmp_path / "other.csv").write_text("0 1\n2 3\n4 5\n6 7\n")
+    deck = added(f"<Reference_Spline {said}>")
+    name = "Reference_Spline[1]"
+    for given in (
+        (f"{name}.x=0 2 4 6", f"{name}.y=1 3 5 7"),
+        (f"{name}.points=0 1 2 3 4 5 6 7",),
+        (f"{name}.file=other.csv",),
+    ):
+        spline = read_xml(tmp_path, deck, given).splines[1]
+        assert spline.x == (0.0, 2.0, 4.0, 6.0)
+        assert spline.y == ((1.0, 3.0, 5.0, 7.0),)
+    for given in (f"{name}.x=0 2 4 6", f"{name}.y=1 3 5"):
+        with pytest.raises(DeckError):
+            read_xml(tmp_path, deck, (given, f"{name}.file=other.csv"))
+
+
+def test_points_of_a_curve_replace_its_matrix(tmp_path):
+    curve = added('<Reference_ParamCurve id="1" is_curve_points="TRUE" matrix_id="3"/>')
+    points = "0 0 0  1 0 0  2 1 0  3 0 0  4 1 0"
+    found = read_xml(tmp_path, curve, (f"Reference_ParamCurve[1].points={points}",)).curves[1]
+    assert found.points[2] == (2.0, 1.0, 0.0)
