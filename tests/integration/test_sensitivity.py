@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 import mbsim
+from helpers import tight_runs
 from helpers.decks import run_model
 from helpers.folders import MODELS
 from mbsim.cli.main import main
@@ -89,16 +90,11 @@ TWO_BOXES = """<Deck><Model><Body_Rigid id="1" isground="TRUE"/><Reference_Marke
 
 def differences(deck, name, value, step, signals, **how):
     """Return differences of order 4 of tight runs, signal by signal."""
-    runs = [
-        mbsim.simulate(deck, overrides={name: value + part * step}, tol=1e-12, **how)
-        for part in (1.0, -1.0, 0.5, -0.5)
-    ]
-    found = {}
-    for signal in signals:
-        whole = (runs[0][signal] - runs[1][signal]) / (2.0 * step)
-        half = (runs[2][signal] - runs[3][signal]) / step
-        found[signal] = (4.0 * half - whole) / 3.0
-    return found
+    whole, half = (
+        tight_runs.differences(deck, name, value, part * step, signals, **how)
+        for part in (1.0, 0.5)
+    )
+    return {signal: (4.0 * half[signal] - whole[signal]) / 3.0 for signal in signals}
 
 
 def off(found, truth):

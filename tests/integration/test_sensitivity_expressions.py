@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import mbsim
+from helpers.tight_runs import differences
 
 DECK = """<Deck><Model>
 <Body_Rigid id="1" isground="TRUE"/>
@@ -39,11 +40,8 @@ def run_of(force, integrator, **how):
 )
 def test_numbers_that_are_alike_by_chance_and_kinks(force, integrator):
     run = run_of(force, integrator, tol=1e-9, sensitivity=[NAME])
-    up, down = (
-        run_of(force, "DOP853", tol=1e-12, overrides={NAME: 0.5 + side * 1e-4})[SIGNAL]
-        for side in (1.0, -1.0)
-    )
-    truth = (up - down) / 2e-4
+    deck, how = DECK.format(force=force), {"integrator": "DOP853"}
+    truth = differences(deck, NAME, 0.5, 1e-4, (SIGNAL,), **how)[SIGNAL]
     assert run.parameters[NAME]["known_until"] == math.inf
     assert np.abs(run.sensitivity(SIGNAL, NAME) - truth).max() < 1e-4 * np.abs(truth).max()
 

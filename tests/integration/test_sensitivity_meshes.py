@@ -7,6 +7,7 @@ import pytest
 
 import mbsim
 from helpers.folders import MODELS
+from helpers.tight_runs import differences
 from mbsim.errors import ModelError
 
 # an octahedron of 10 mm falls onto a plane, and beside it a box onto a mesh that stands still
@@ -46,11 +47,7 @@ def test_derivatives_of_meshes_are_those_of_runs(name, value, step, body):
     signal, how = f"bodies/{body}/velocity/z", {"integrator": "DOPRI5"}
     run = mbsim.simulate(DECK, sensitivity=[name], tol=1e-9, **how)
     assert np.count_nonzero(run["events"]["kind"] == "touch") >= 2
-    up, down = (
-        mbsim.simulate(DECK, overrides={name: value + side * step}, tol=1e-11, **how)[signal]
-        for side in (1.0, -1.0)
-    )
-    truth = (up - down) / (2.0 * step)
+    truth = differences(DECK, name, value, step, (signal,), tol=1e-11, **how)[signal]
     found = run.sensitivity(signal, name)
     assert run.parameters[name]["known_until"] == np.inf
     assert np.abs(found - truth).max() < 1e-3 * np.abs(truth).max()

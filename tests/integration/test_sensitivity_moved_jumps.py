@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import mbsim
+from helpers.tight_runs import differences
 
 NAME, AT = "Reference_Variable[1].expr", 0.4987
 PUSHED = f"""<Deck><Model>
@@ -43,18 +44,9 @@ DRIVEN = """<Deck><Model>
 </Command></Deck>"""
 
 
-def differences(deck, signal, step=1e-5):
-    """Return the difference of two tight runs."""
-    up, down = (
-        mbsim.simulate(deck, integrator="DOP853", tol=1e-12, overrides={NAME: AT + side * step})
-        for side in (1.0, -1.0)
-    )
-    return (up[signal] - down[signal]) / (2.0 * step)
-
-
 def is_as(deck, signal, integrator, allowed, tol=1e-9):
     run = mbsim.simulate(deck, integrator=integrator, tol=tol, sensitivity=[NAME])
-    truth = differences(deck, signal)
+    truth = differences(deck, NAME, AT, 1e-5, (signal,), integrator="DOP853")[signal]
     assert run.parameters[NAME]["known_until"] == math.inf
     assert np.abs(run.sensitivity(signal, NAME) - truth).max() < allowed * np.abs(truth).max()
 

@@ -9,6 +9,7 @@ import pytest
 
 import mbsim
 from helpers.libraries import example
+from helpers.tight_runs import differences
 from mbsim.errors import ModelError
 
 SCRIPT = """from math import sin
@@ -57,13 +58,8 @@ SIGNAL = "bodies/2/position"
 
 
 def holds(deck, name, value, integrator="DOPRI5"):
-    up, down = (
-        mbsim.simulate(
-            deck, integrator="DOP853", tol=1e-11, overrides={name: value * (1 + side * 1e-5)}
-        )[SIGNAL]
-        for side in (1.0, -1.0)
-    )
-    truth = (up - down) / (2e-5 * value)
+    how = {"integrator": "DOP853", "tol": 1e-11}
+    truth = differences(deck, name, value, 1e-5 * value, (SIGNAL,), **how)[SIGNAL]
     run = mbsim.simulate(deck, integrator=integrator, tol=1e-9, sensitivity=[name])
     assert run.parameters[name]["known_until"] == math.inf
     assert np.abs(run.sensitivity(SIGNAL, name) - truth).max() < 1e-5 * np.abs(truth).max()
