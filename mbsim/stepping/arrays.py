@@ -33,12 +33,13 @@ RULE_NUMBERS = 5
     KEPT_STICKS,  # 1 where the pair's friction is less than it may be
     KEPT_ROW,
     KEPT_STAYS,  # 1 where a point of the step at hand is the same one
-    KEPT_HIT,  # 1 where an impact with restitution was part of the force
-) = range(11)
-KEPT_POINT, KEPT_NORMAL, KEPT_TANGENT, KEPT_FORCE = 11, 14, 17, 20
+    KEPT_HIT_I,  # 1 where an impact was part of the force, and I did not go on as if nothing hit it
+    KEPT_HIT_J,
+) = range(12)
+KEPT_POINT, KEPT_NORMAL, KEPT_TANGENT, KEPT_FORCE = 12, 15, 18, 21
 # from the cg of I, then J
-KEPT_ARMS = 23
-KEPT_COLUMNS = 29
+KEPT_ARMS = 24
+KEPT_COLUMNS = 30
 # entries of `Plan.number`: 1 where the error of steps is not estimated; 1 where some kind of pair
 # is not near; part of a step's jumps that the solver may leave; 1 where bodies at rest may sleep;
 # the tolerance

@@ -34,7 +34,7 @@ from mbsim.stepping.arrays import (
     KEPT_ARMS,
     KEPT_BODY_I,
     KEPT_FORCE,
-    KEPT_HIT,
+    KEPT_HIT_I,
     LEFT_SPEED,
     LENGTH,
     POINTS,
@@ -182,11 +182,10 @@ def find_what_goes_on(scene: Scene, S: Stepping, h: float) -> None:
 def push_carried(S: Stepping, row: int, h: float) -> None:
     """Add to `M.carried` what the force of a kept contact point does to free bodies in a step."""
     M, values = S.motion, S.kept.table[row]
-    if values[KEPT_HIT] == 1.0:
-        return
     for side in range(2):
         b = int(values[KEPT_BODY_I + side])
-        if b == len(S.rest.body) or S.plan.group[b] >= 0:
+        hit = values[KEPT_HIT_I + side] == 1.0
+        if hit or b == len(S.rest.body) or S.plan.group[b] >= 0:
             continue
         f = scale(h if side == 0 else -h, vector(values[KEPT_FORCE:]))
         T = cross(vector(values, KEPT_ARMS + 3 * side), f)
@@ -199,8 +198,9 @@ def push_carried(S: Stepping, row: int, h: float) -> None:
 def find_carried(scene: Scene, S: Stepping, h: float) -> None:
     """Fill what contacts take off what accelerates bodies, if they press on as in the last step.
 
-    Impacts are over with their step, also where they have done more to a body elsewhere. Of bodies
-    that joints hold together it is none: they press on each other by these.
+    Impacts are over with their step, also where they have done more to a body elsewhere. Of a body
+    that went on all is taken: what held it has them too. Of bodies that joints hold together it is
+    none: they press on each other by these.
     """
     M, kept = S.motion, S.kept
     for row in range(bodies_awake(scene)):

@@ -20,7 +20,7 @@ from mbsim.stepping.arrays import (
     KEPT_CONTACT,
     KEPT_FORCE,
     KEPT_GAP,
-    KEPT_HIT,
+    KEPT_HIT_I,
     KEPT_NORMAL,
     KEPT_POINT,
     KEPT_ROW,
@@ -191,7 +191,9 @@ def keep_points(scene: Scene, S: Stepping) -> None:
         values[KEPT_SLIP] = (x * x + z * z) ** 0.5
         # see `share_sticking`
         values[KEPT_STICKS] = P.mu[k]
-        values[KEPT_HIT] = 0.0 if P.part[k] == NO_IMPACT else 1.0
+        for side in range(2):
+            hit = P.part[k] != NO_IMPACT and M.goes_on[P.body[k, side]] == 0
+            values[KEPT_HIT_I + side] = 1.0 if hit else 0.0
         n, t = vector(P.normal[k]), vector(P.tangent[k])
         b = cross(n, t)
         force = add(scale(P.r[k, 0], n), add(scale(P.r[k, 1], t), scale(P.r[k, 2], b)))

@@ -27,11 +27,12 @@ def run(
     end: float,
     tol: float,
     mu: float = 0.5,
+    graphics: Sequence[int] = (),
 ) -> mbsim.Results:
     """Run bodies 2, 3, ... on a floor by steps of length h, or by error."""
     law = text.impact(1e6, 1.0, damping, 1e-4)
     law |= text.coulomb(mu, 0.01) if mu > 0.0 else {}
-    ids = [100 * (2 + k) for k in range(len(parts))]
+    ids = graphics or [100 * (2 + k) for k in range(len(parts))]
     statements = [text.GROUND, text.FLOOR, *parts, text.contact(301, ids, [100], **law)]
     if len(ids) > 1:
         statements.append(text.contact(302, ids, ids, **law))
@@ -176,6 +177,22 @@ def test_what_others_carry_is_hit_while_it_moves(tmp_path, scene, h) -> None:
     square = found / np.append(0.3, found[:-1])
     # of the stack part of what an impact leaves goes into what lies below
     assert square == pytest.approx(square[0], abs=0.02)
+
+
+@pytest.mark.parametrize("h", [0.02, *STEPS])
+@pytest.mark.parametrize("speed", [0.0, 1.0])
+def test_balls_that_bounce_at_other_times_do_so_as_alone(tmp_path, speed, h) -> None:
+    """Behind an impact what holds the box was not known: others met it as if it fell."""
+    box = text.cuboid(
+        3, 5.0, (3.0 * EDGE,) * 2 + (EDGE,), (0.0, 0.0, 0.5 * EDGE), (speed, 0.0, 0.0)
+    )
+    parts, forward = [box], (speed, 0.0, 0.0)
+    for body, y, height, mass in ((8, -0.2, 0.17, 1.0), (9, 0.2, 0.31, 3.0)):
+        parts.append(text.sphere(body, mass, 0.05, (0.0, y, EDGE + 0.05 + height), forward))
+    results = run(tmp_path, parts, 600.0, h, 0.9, 1e-4, 0.0, [300, 800, 900])
+    assert results.audit.entries["energy"].value < 1e-4
+    gained = np.diff(results["energy/kinetic"] + results["energy/potential"])
+    assert gained.max() < 1e-4
 
 
 @pytest.mark.parametrize(("h", "tol"), [(0.01, 1e-6), (0.01, 1e-4), (0.005, 1e-4), (None, 1e-4)])
