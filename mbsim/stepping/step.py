@@ -101,8 +101,8 @@ from mbsim.stepping.solver import move_farther, project_positions, solve_points
 MOST_YIELDS = 20
 #: So often impacts of what a step throws at each other are put off with what they take solved anew.
 MOST_POSTPONED = 5
-#: How often it is solved at most, as bodies that it is solved for turn out to be carried, or to
-#: hang above where they land.
+#: How often a step is solved at most, as bodies turn out to be carried, or to hang above where they
+#: land.
 MOST_LANDINGS = 3
 #: How often a step's contact problem is solved at most, each time with what bodies hit that the
 #: impulses threw at it.
@@ -283,8 +283,10 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
         changed = let_carry(S, count, h)
         if not let_land(S, count, h) and not changed:
             break
-    move_farther(P, M, count)
-    fill_shift(scene, S)
+    if len(S.plan.members) > 0:
+        # of bodies that joints hold, or forces couple, to those that have points
+        move_farther(P, M, count)
+        fill_shift(scene, S)
     pushes = project_positions(P, M.shift, count, h)
     number = tally.number
     # of two halves that make one step the worse one counts
