@@ -150,7 +150,6 @@ class Motion(NamedTuple):
     reach: F1  # (ng,) how far a graphic may come in the step
     went: F1  # (ng,) how far it goes by what impulses give
     slope: F1  # (ny,) y'
-    spare: F2  # (3, 6) changes of a body's velocity, see `energy`
     way: F2  # (2, 6) velocities of the bodies of a pair that is moved ahead
     frames: F2  # (2, 12) of its graphics at the step's begin
     pressed: I1  # (nb + 1,) the try of a step before which a body pressed on one that moves
@@ -394,7 +393,6 @@ def make(
         reach=numbers(ng),
         went=numbers(ng),
         slope=numbers(ny),
-        spare=numbers(3, 6),
         way=numbers(2, 6),
         frames=numbers(2, 12),
         pressed=whole(nb + 1),

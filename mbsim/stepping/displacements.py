@@ -55,10 +55,10 @@ PRESSED, LANDS, FLIES = 0.0, 1.0, 2.0
 #: A velocity that changes by more than so many times what forces without contacts change has
 #: jumped.
 JUMPS = 10.0
-#: A body's velocity at the step's end is another one from this part on of what it would change by
-#: alone.
+#: Two velocities of a body are not the same if they differ by more than this part of what forces
+#: without contacts change of its velocity in the step.
 OTHERWISE = 0.1
-#: Others hold what changes its velocity by no more than this part of that.
+#: Contacts hold a body whose velocity changes by no more than this part of that.
 HELD_UP = 0.9
 
 
@@ -205,6 +205,8 @@ def find_carried(scene: Scene, S: Stepping, h: float) -> None:
     M, kept = S.motion, S.kept
     for row in range(bodies_awake(scene)):
         M.carried[body_awake(scene, row), :] = 0.0
+    if kept.count[0] == kept.count[SLEEPING_ROWS]:
+        return
     for row in range(kept.count[SLEEPING_ROWS], kept.count[0]):
         push_carried(S, row, h)
     for row in range(bodies_awake(scene)):

@@ -92,10 +92,15 @@ def note_grounded(scene: Scene, S: Stepping, i: int, j: int) -> None:
 
 
 @jitable
-def product(scene: Scene, b: int, v: F1, w: F1) -> float:
+def change(v: F1, before: F1) -> tuple[V3, V3]:
+    """Return by how much a velocity and a spin differ from others."""
+    return sub(vector(v), vector(before)), sub(vector(v, 3), vector(before, 3))
+
+
+@jitable
+def product(scene: Scene, b: int, v: tuple[V3, V3], w: tuple[V3, V3]) -> float:
     """Return v . M w of body b as it is turned now, global axes."""
-    turning = turned_energy(scene, b, vector(v, 3), vector(w, 3))
-    return scene.bodies.mass[b] * dot(vector(v), vector(w)) + turning
+    return scene.bodies.mass[b] * dot(v[0], w[0]) + turned_energy(scene, b, v[1], w[1])
 
 
 @jitable
@@ -107,14 +112,13 @@ def left_of_flight(scene: Scene, S: Stepping, b: int) -> float:
     M, part = S.motion, S.motion.part[b]
     if not is_hit(S, b):
         return 0.0
-    lost = 0.0
-    for c in range(6):
-        M.spare[0, c], M.spare[1, c] = M.v[b, c] - M.before[b, c], M.free[b, c] - M.before[b, c]
-        M.spare[2, c] = M.flight[b, c] - M.before[b, c]
+    lost, before = 0.0, M.before[b]
     if is_carried(S, b):
-        lost += (part - 0.5) * product(scene, b, M.carried[b], M.spare[0])
+        takes = (vector(M.carried[b]), vector(M.carried[b], 3))
+        lost += (part - 0.5) * product(scene, b, takes, change(M.v[b], before))
     if M.flies[b] == LANDS:
-        lost += 0.5 * (1.0 - part) ** 2 * product(scene, b, M.spare[1], M.spare[2])
+        alone, flies = change(M.free[b], before), change(M.flight[b], before)
+        lost += 0.5 * (1.0 - part) ** 2 * product(scene, b, alone, flies)
     return lost
 
 
