@@ -127,6 +127,15 @@ def test_numbers_that_are_not_known_are_said_to_be_none(tmp_path):
     assert abs(run["bodies/2/velocity/x"][1] - 2.0) < 1e-6
 
 
+def rubbed_ball(folder, subroutine, numbers, height):
+    """Write a ball that lies on the ground at its centre's height, rubbed by a subroutine."""
+    (folder / "laws.py").write_text(subroutine)
+    law = IMPACT + ' script_name="laws.py"' + FRICTION.replace("0.3,0.01", numbers)
+    file = folder / "ball.xml"
+    file.write_text(BALL.format(law=law, more="").replace('pos_z="0.2"', f'pos_z="{height}"'))
+    return file
+
+
 OVER_SPEED = """
 def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):
     v = (xdot[0] ** 2 + xdot[1] ** 2 + 1e-8) ** 0.5
@@ -140,11 +149,7 @@ def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):
 @pytest.mark.parametrize("integrator", ["DOPRI5", "DOP853", "RADAU5", "GALPHA"])
 def test_a_users_friction_that_jumps_over_the_slip_speed(integrator, tmp_path):
     # a sphere at rest on its contact slides from 2 to below 1.3; it begins to roll
-    (tmp_path / "laws.py").write_text(OVER_SPEED)
-    file = tmp_path / "ball.xml"
-    law = IMPACT + ' script_name="laws.py"' + FRICTION.replace("0.3,0.01", "0.3,1.3,0.2")
-    low = BALL.format(law=law, more="").replace('pos_z="0.2"', 'pos_z="0.1074"')
-    file.write_text(low)
+    file = rubbed_ball(tmp_path, OVER_SPEED, "0.3,1.3,0.2", "0.1074")
     numbers = [f"Force_Contact[301].cff_param_string[{k}]" for k in (1, 2, 3)]
     run = mbsim.simulate(file, integrator=integrator, tol=1e-8, sensitivity=numbers)
     for name in numbers[:2]:
@@ -191,10 +196,7 @@ def test_a_users_friction_that_is_steep_but_smooth_is_known(integrator, tmp_path
         "    s = 200.0 * (v - par[1])\n    s = s / (1.0 + s * s) ** 0.5\n"
         "    mu = par[2] + 0.5 * (par[0] - par[2]) * (1.0 + s)\n",
     )
-    (tmp_path / "laws.py").write_text(steep)
-    file = tmp_path / "ball.xml"
-    law = IMPACT + ' script_name="laws.py"' + FRICTION.replace("0.3,0.01", "0.3,1.3,0.2")
-    file.write_text(BALL.format(law=law, more="").replace('pos_z="0.2"', 'pos_z="0.1074"'))
+    file = rubbed_ball(tmp_path, steep, "0.3,1.3,0.2", "0.1074")
     holds(file, "Force_Contact[301].cff_param_string[2]", 1.3, integrator)
 
 
@@ -210,11 +212,7 @@ def CFFSUB(id, time, par, npar, loci, locj, x, xdot, nforce, dflag, iflag):
 
 @pytest.mark.parametrize("integrator", ["DOPRI5", "DOP853", "RADAU5", "GALPHA"])
 def test_a_time_that_a_users_law_keeps_to_itself(integrator, tmp_path):
-    (tmp_path / "laws.py").write_text(CLOCK)
-    file = tmp_path / "ball.xml"
-    law = IMPACT + ' script_name="laws.py"' + FRICTION.replace("0.3,0.01", "0.1,0.2987,0.05")
-    low = BALL.format(law=law, more="").replace('pos_z="0.2"', 'pos_z="0.107"')
-    file.write_text(low)
+    file = rubbed_ball(tmp_path, CLOCK, "0.1,0.2987,0.05", "0.107")
     moved, other = (f"Force_Contact[301].cff_param_string[{k}]" for k in (2, 3))
     run = mbsim.simulate(file, integrator=integrator, tol=1e-8, sensitivity=[moved, other])
     # which of its times the force jumps at nothing tells but the force itself
