@@ -39,7 +39,6 @@ EVEN = 1e-3
 #: Over a shorter part of its length a spring that slips does not stick and slip unseen: it hardly
 #: turns, and where slip is rounding its way has no direction.
 SHORT_WAY = 0.01
-
 #: Slip may stop within a step where its least is below this part of what it changes by there.
 NEARLY = 0.5
 
@@ -183,13 +182,13 @@ def dips_in(scene: Scene, s: int, y: F1, before: F1, h: float) -> tuple[float, f
 @jitable
 def dips_of(scene: Scene, y: F1, before: F1, f: int, h: float) -> tuple[float, float]:
     """Return `dip` of slip of dry friction f within h; bodies are left placed at y."""
+    if scene.applied.form[f] == AXIS_TORQUE and scene.applied.angle[f] < 0:
+        return math.nan, math.inf
     way = scene.state.dry[f, SLIDES]
     _, x, last = displacement(scene, y, f)
     place_bodies(scene, before)
     _, began, first = displacement(scene, before, f)
     place_bodies(scene, y)
-    if scene.applied.form[f] == AXIS_TORQUE and scene.applied.angle[f] < 0:
-        return math.nan, math.inf
     return dip(way * first, way * last, way * (x - began) / h)
 
 
