@@ -36,7 +36,8 @@ from mbsim.stepping.arrays import (
     Motion,
     Stepping,
 )
-from mbsim.stepping.displacements import is_carried, meets_at
+from mbsim.stepping.carried import carry_held, is_carried
+from mbsim.stepping.displacements import meets_at
 from mbsim.stepping.points import deepest_of, is_point, put_place, slop_of, take_rows
 from mbsim.stepping.scales import group_at, noise_of
 
@@ -328,12 +329,15 @@ def keep_frames(scene: Scene, M: Motion, pair: int) -> None:
 
 
 @jitable
-def one_is_carried(scene: Scene, S: Stepping, pair: int) -> bool:
-    """Return whether others carry one body of a pair, and the other one flies."""
+def one_is_carried(scene: Scene, S: Stepping, pair: int, h: float) -> bool:
+    """Return whether others carry one body of a pair in a step h, and the other one flies."""
     i = scene.graphics.body[scene.pairs.graphic_i[pair]]
     j = scene.graphics.body[scene.pairs.graphic_j[pair]]
     ground = len(S.rest.body)
-    return i != ground and j != ground and is_carried(S, i) != is_carried(S, j)
+    if i == ground or j == ground:
+        return False
+    carry_held(scene, S, h)
+    return is_carried(S, i) != is_carried(S, j)
 
 
 @jitable
@@ -341,7 +345,7 @@ def look_ahead_of(scene: Scene, S: Stepping, y: F1, pair: int, h: float, depth: 
     """Take the points of a measured pair that meets within the step; False if there is no room."""
     M, room = S.motion, True
     keep_frames(scene, M, pair)
-    for which in range(CARRIED if one_is_carried(scene, S, pair) else BOTH, ONLY_J + 1):
+    for which in range(CARRIED if one_is_carried(scene, S, pair, h) else BOTH, ONLY_J + 1):
         choose_way(scene, S, pair, which)
         t = find_touch(scene, S, y, pair, h, depth)
         if t >= 0.0:

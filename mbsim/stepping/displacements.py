@@ -14,36 +14,23 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.scene import Scene
-from mbsim.core.arrays import F1, F2
+from mbsim.core.arrays import F1
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
-from mbsim.core.rotation import (
-    cross,
-    dot,
-    matrix_from_quaternion,
-    norm,
-    scale,
-    unrotate,
-    vector,
-)
+from mbsim.core.rotation import matrix_from_quaternion, norm, unrotate, vector
 from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
 from mbsim.dynamics.bodies.configuration import turn
 from mbsim.dynamics.bodies.kinematics import place_bodies
 from mbsim.stepping.arrays import (
     ASLEEP,
-    KEPT_ARMS,
-    KEPT_BODY_I,
-    KEPT_FORCE,
-    KEPT_HIT_I,
     LEFT_SPEED,
-    LENGTH,
     POINTS,
-    SLEEPING_ROWS,
     SLOP,
     STEP_LENGTH,
     W_NN,
     Stepping,
 )
+from mbsim.stepping.carried import carries, find_what_goes_on
 from mbsim.stepping.one_point import velocity_of
 from mbsim.stepping.scales import group_at
 
@@ -55,11 +42,6 @@ PRESSED, LANDS, FLIES = 0.0, 1.0, 2.0
 #: A velocity that changes by more than so many times what forces without contacts change has
 #: jumped.
 JUMPS = 10.0
-#: Two velocities of a body are not the same if they differ by more than this part of what forces
-#: without contacts change of its velocity in the step.
-OTHERWISE = 0.1
-#: Contacts hold a body whose velocity changes by no more than this part of that.
-HELD_UP = 0.9
 
 
 @jitable
@@ -73,20 +55,6 @@ def meets_at(gap: float, h: float, before: float, free: float) -> float:
     if before < 0.0:
         return min(2.0 * c / (root - before), 1.0)
     return min((before + root) / (-2.0 * a), 1.0) if a < 0.0 else 1.0
-
-
-@jitable
-def is_carried(S: Stepping, b: int) -> bool:
-    """Return whether contacts take something off what accelerates a body."""
-    return norm(vector(S.motion.carried[b])) + norm(vector(S.motion.carried[b], 3)) > 0.0
-
-
-@jitable
-def carries(S: Stepping, k: int) -> bool:
-    """Return whether point k presses as it did in the last step, as far as flights say."""
-    i, j, ground = S.points.body[k, 0], S.points.body[k, 1], len(S.rest.body)
-    known = (i == ground or is_carried(S, i)) and (j == ground or is_carried(S, j))
-    return known and S.points.was[k] >= 0
 
 
 @jitable
@@ -114,12 +82,6 @@ def start_parts(scene: Scene, S: Stepping, count: int, h: float) -> None:
         for b in (i, j):
             M.part[b], M.touch[b] = min(M.part[b], part), min(M.touch[b], touch)
             M.flies[b] = min(M.flies[b], flies)
-    if M.part[ground] == NO_IMPACT:
-        M.part[ground] = 0.5
-    for row in range(bodies_awake(scene)):
-        b = body_awake(scene, row)
-        if M.part[b] == NO_IMPACT:
-            M.part[b] = 0.5
 
 
 @jitable
@@ -136,102 +98,6 @@ def take_least(S: Stepping, i: int, j: int, lasts: bool) -> bool:
         M.flies[i] = M.flies[j] = min(M.flies[i], M.flies[j])
         return True
     return not same
-
-
-@jitable
-def distance(S: Stepping, b: int, v: F2, w: F2) -> float:
-    """Return the largest component by which two velocities of a body differ.
-
-    Spins count by how fast they move what is the length of its group away.
-    """
-    length, most = S.plan.scale[S.plan.connected[b], LENGTH], 0.0
-    for c in range(6):
-        most = max(most, (1.0 if c < 3 else length) * abs(v[b, c] - w[b, c]))
-    return most
-
-
-@jitable
-def rests(S: Stepping, b: int, h: float) -> bool:
-    """Return whether a body goes no way in the step that counts, and others hold it there.
-
-    What turns round in the air changes its velocity by more.
-    """
-    M, way = S.motion, 0.0
-    length = S.plan.scale[S.plan.connected[b], LENGTH]
-    for c in range(6):
-        fastest = max(abs(M.before[b, c]), abs(M.v[b, c]))
-        way = max(way, h * (1.0 if c < 3 else length) * fastest)
-    if way > S.plan.scale[S.plan.connected[b], SLOP]:
-        return False
-    return distance(S, b, M.v, M.before) <= HELD_UP * distance(S, b, M.free, M.before)
-
-
-@jitable
-def find_what_goes_on(scene: Scene, S: Stepping, h: float) -> None:
-    """Note the bodies that others hold, and that go on as if nothing hit them."""
-    M, plan = S.motion, S.plan
-    M.goes_on[len(S.rest.body)] = 1
-    for row in range(bodies_awake(scene)):
-        b = body_awake(scene, row)
-        off, alone = distance(S, b, M.v, M.flight), distance(S, b, M.free, M.before)
-        little = off <= OTHERWISE * alone and h * off <= plan.scale[plan.connected[b], SLOP]
-        M.goes_on[b] = 1 if (little and is_carried(S, b)) or rests(S, b, h) else 0
-
-
-@jitable
-def push_carried(S: Stepping, row: int, h: float) -> None:
-    """Add to `M.carried` what the force of a kept contact point does to free bodies in a step."""
-    M, values = S.motion, S.kept.table[row]
-    for side in range(2):
-        b = int(values[KEPT_BODY_I + side])
-        hit = values[KEPT_HIT_I + side] == 1.0
-        if hit or b == len(S.rest.body) or S.plan.group[b] >= 0:
-            continue
-        f = scale(h if side == 0 else -h, vector(values[KEPT_FORCE:]))
-        T = cross(vector(values, KEPT_ARMS + 3 * side), f)
-        for c in range(6):
-            inverse = M.inverse[b, c]
-            M.carried[b, c] += dot(vector(inverse), f) + dot(vector(inverse, 3), T)
-
-
-@jitable
-def find_carried(scene: Scene, S: Stepping, h: float) -> None:
-    """Fill what contacts take off what accelerates bodies, if they press on as in the last step.
-
-    Impacts are over with their step, also where they have done more to a body elsewhere. Of a body
-    that went on all is taken: what held it has them too. Of bodies that joints hold together it is
-    none: they press on each other by these.
-    """
-    M, kept = S.motion, S.kept
-    for row in range(bodies_awake(scene)):
-        M.carried[body_awake(scene, row), :] = 0.0
-    if kept.count[0] == kept.count[SLEEPING_ROWS]:
-        return
-    for row in range(kept.count[SLEEPING_ROWS], kept.count[0]):
-        push_carried(S, row, h)
-    for row in range(bodies_awake(scene)):
-        b = body_awake(scene, row)
-        changed, alone = 0.0, distance(S, b, M.free, M.before)
-        for c in range(6):
-            size = 1.0 if c < 3 else S.plan.scale[S.plan.connected[b], LENGTH]
-            changed = max(changed, size * abs(M.carried[b, c]))
-        if changed > (1.0 + OTHERWISE) * alone:
-            M.carried[b, :] = 0.0
-
-
-@jitable
-def fill_flight(scene: Scene, S: Stepping) -> None:
-    """Fill what bodies do in the step until they meet.
-
-    What others carry is accelerated against nothing: what flies at it is, by its own forces.
-    """
-    M, ground = S.motion, len(S.rest.body)
-    for c in range(6):
-        M.flight[ground, c] = M.free[ground, c]
-    for row in range(bodies_awake(scene)):
-        b = body_awake(scene, row)
-        for c in range(6):
-            M.flight[b, c] = M.free[b, c] + M.carried[b, c]
 
 
 @jitable
@@ -256,6 +122,12 @@ def spread_parts(scene: Scene, S: Stepping, count: int, h: float) -> None:
             first = plan.members[plan.first[g]]
             for m in range(plan.first[g] + 1, plan.first[g + 1]):
                 changed = take_least(S, first, plan.members[m], True) or changed
+    for row in range(bodies_awake(scene)):
+        b = body_awake(scene, row)
+        if S.motion.part[b] == NO_IMPACT:
+            S.motion.part[b] = 0.5
+    if S.motion.part[len(S.rest.body)] == NO_IMPACT:
+        S.motion.part[len(S.rest.body)] = 0.5
 
 
 @jitable

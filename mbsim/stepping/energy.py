@@ -27,7 +27,7 @@ from mbsim.core.layout import AT_W, BODY_SIZE
 from mbsim.core.rotation import add, dot, rotate, scale, sub, unrotate, vector
 from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
 from mbsim.stepping.arrays import ASLEEP, LEFT_OPEN, POINTS, Stepping
-from mbsim.stepping.displacements import LANDS, is_carried, is_hit
+from mbsim.stepping.displacements import LANDS, is_hit
 from mbsim.stepping.one_point import direction, velocity_of
 
 
@@ -113,9 +113,8 @@ def left_of_flight(scene: Scene, S: Stepping, b: int) -> float:
     if not is_hit(S, b):
         return 0.0
     lost, before = 0.0, M.before[b]
-    if is_carried(S, b):
-        takes = (vector(M.carried[b]), vector(M.carried[b], 3))
-        lost += (part - 0.5) * product(scene, b, takes, change(M.v[b], before))
+    takes = change(M.flight[b], M.free[b])
+    lost += (part - 0.5) * product(scene, b, takes, change(M.v[b], before))
     if M.flies[b] == LANDS:
         alone, flies = change(M.free[b], before), change(M.flight[b], before)
         lost += 0.5 * (1.0 - part) ** 2 * product(scene, b, alone, flies)

@@ -15,7 +15,8 @@ from mbsim.stepping.arrays import (
     W_NN,
     Stepping,
 )
-from mbsim.stepping.displacements import NO_IMPACT, OTHERWISE, distance, meets_at, rests
+from mbsim.stepping.carried import OTHERWISE, distance_held, fly_by, rests
+from mbsim.stepping.displacements import NO_IMPACT, meets_at
 from mbsim.stepping.one_point import apply, velocity_of
 from mbsim.stepping.scales import group_at, noise_of
 
@@ -105,11 +106,10 @@ def let_carry(S: Stepping, count: int, h: float) -> bool:
         for b in P.body[k]:
             if b == len(S.rest.body):
                 continue
-            off, alone = distance(S, b, M.flight, M.before), distance(S, b, M.free, M.before)
-            if off > OTHERWISE * alone and rests(S, b, h):
+            off = distance_held(S, b, M.flight, M.before)
+            if off > OTHERWISE * distance_held(S, b, M.free, M.before) and rests(S, b, h):
                 some = True
-                for c in range(6):
-                    M.flight[b, c] = M.before[b, c]
+                fly_by(S, b, M.before)
     if some:
         for k in range(count):
             if P.part[k] != NO_IMPACT:

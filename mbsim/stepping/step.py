@@ -55,11 +55,10 @@ from mbsim.stepping.arrays import (
     WOKEN,
     Stepping,
 )
+from mbsim.stepping.carried import carry_held, comes_from_afar, fill_flight, find_carried
 from mbsim.stepping.displacements import (
     NO_IMPACT,
-    fill_flight,
     fill_shift,
-    find_carried,
     move_bodies,
     spread_parts,
     velocities_jump,
@@ -186,6 +185,31 @@ def prepare_points(scene: Scene, S: Stepping, h: float) -> int:
 
 
 @jitable
+def look_at(S: Stepping, k: int, h: float) -> None:
+    """Fill what impulses have to bring about at point k, by what its bodies do until they meet."""
+    P = S.points
+    look_ahead(S, k, h)
+    P.held[k] = HELD if P.part[k] != NO_IMPACT and is_held(S, k, h) else 0
+    if P.held[k] == HELD:
+        P.ahead[k], P.part[k] = max(P.gap[k], 0.0) / h, NO_IMPACT
+
+
+@jitable
+def look_at_points(scene: Scene, S: Stepping, h: float) -> None:
+    """Fill what impulses have to bring about, and how bodies fly if others hold what is hit."""
+    P, M, hit = S.points, S.motion, False
+    fill_flight(scene, S)
+    for k in range(S.tally.count[POINTS]):
+        look_at(S, k, h)
+        hit = hit or (P.part[k] != NO_IMPACT and comes_from_afar(S, k, h))
+        fill_drift(P, k, M.before, M.free)
+    if hit and carry_held(scene, S, h):
+        for k in range(S.tally.count[POINTS]):
+            if comes_from_afar(S, k, h):
+                look_at(S, k, h)
+
+
+@jitable
 def start_impulses(scene: Scene, S: Stepping, h: float) -> None:
     """Fill what impulses have to bring about, and velocities with them as they stand."""
     P, M, ground = S.points, S.motion, len(S.rest.body)
@@ -204,13 +228,7 @@ def start_impulses(scene: Scene, S: Stepping, h: float) -> None:
             # what holds there is not known yet
             M.changed[P.body[k, 0]] = M.changed[P.body[k, 1]] = 1
     M.changed[ground] = 0
-    fill_flight(scene, S)
-    for k in range(S.tally.count[POINTS]):
-        look_ahead(S, k, h)
-        fill_drift(P, k, M.before, M.free)
-        P.held[k] = HELD if P.part[k] != NO_IMPACT and is_held(S, k, h) else 0
-        if P.held[k] == HELD:
-            P.ahead[k], P.part[k] = max(P.gap[k], 0.0) / h, NO_IMPACT
+    look_at_points(scene, S, h)
 
 
 @jitable
@@ -455,7 +473,6 @@ def take_step(
             index_kept(S)
             make_room(scene, S, y, h)
         find_carried(scene, S, h)
-        fill_flight(scene, S)
         code = find_points(scene, S, y, h, committed)
         if code == 0 and S.rest.count[WOKEN] == 0:
             code = solve_all(scene, S, t, h, y, committed)

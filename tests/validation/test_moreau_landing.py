@@ -195,6 +195,68 @@ def test_balls_that_bounce_at_other_times_do_so_as_alone(tmp_path, speed, h) -> 
     assert gained.max() < 1e-4
 
 
+def joined(kind: str, speed: float) -> tuple[list[str], list[int]]:
+    """Return a ball above a box that joints or a spring hold to another one, and graphics."""
+    forward, centre = (speed, 0.0, 0.0), (0.0, 0.0, 0.5 * EDGE)
+    box = text.cuboid(3, 4.0, (3.0 * EDGE, 3.0 * EDGE, EDGE), centre, forward)
+    place = (0.0, EDGE, 1.5 * EDGE) if kind == "FIXED" else (0.0, 3.0 * EDGE, 0.5 * EDGE)
+    other = text.cuboid(4, 1.0, (EDGE,) * 3, place, forward)
+    end = (0.0, EDGE, EDGE) if kind == "FIXED" else (0.0, 2.0 * EDGE, 0.5 * EDGE)
+    ends = [text.marker(35, 3, end), text.marker(45, 4, end)]
+    if kind == "spring":
+        # along y, from the box' side to that of the other one
+        ends = [
+            text.marker(35, 3, (0.0, 1.5 * EDGE, 0.5 * EDGE)),
+            text.marker(45, 4, (0.0, 2.5 * EDGE, 0.5 * EDGE)),
+        ]
+        given = text.attributes(
+            id=7,
+            type="TRANSLATIONAL",
+            i_marker_id=35,
+            j_marker_id=45,
+            stiffness=1e6,
+            damping=1e2,
+            length=EDGE,
+        )
+        held = f"<Force_SpringDamper {given}/>"
+    else:
+        held = text.joint(7, kind, 35, 45)
+    falls = text.sphere(8, 1.0, 0.05, (0.0, -0.5 * EDGE, EDGE + 0.35), forward)
+    return [box, other, *ends, held, falls], [300, 800] if kind == "FIXED" else [300, 400, 800]
+
+
+@pytest.mark.parametrize("h", [0.02, *STEPS])
+@pytest.mark.parametrize("speed", [0.0, 1.0])
+@pytest.mark.parametrize("kind", ["FIXED", "SPHERICAL", "spring"])
+def test_a_ball_bounces_on_what_joints_hold_to_others_as_alone(tmp_path, kind, speed, h) -> None:
+    """What carries a mechanism was not known: on a box that slid the ball was given 1 %."""
+    parts, graphics = joined(kind, speed)
+    results = run(tmp_path, parts, 30.0, h, 0.9, 1e-4, 0.0, graphics)
+    assert results.audit.warnings == ()
+    assert results.audit.entries["energy"].value < 1e-6
+    found = peaks(results["bodies/8/position"][:, 2] - EDGE - 0.05)
+    square = found / np.append(0.3, found[:-1])
+    assert square == pytest.approx(square[0], abs=0.01)
+
+
+@pytest.mark.parametrize("h", [0.05, 0.02, *STEPS])
+def test_what_a_joint_holds_to_a_ball_goes_its_way_in_an_impact(tmp_path, h) -> None:
+    """Its part of the step before the impact was 1/2, as of what nothing hits: both took that."""
+    high = EDGE + 0.05
+    parts = [
+        text.sphere(2, 1.0, 0.05, (0.0, 0.0, 0.35)),
+        text.sphere(3, 2.0, 0.05, (0.0, 0.0, 0.3 + high)),
+        text.marker(25, 2, (0.0, 0.0, 0.4)),
+        text.marker(35, 3, (0.0, 0.0, 0.4)),
+        text.joint(7, "FIXED", 25, 35),
+    ]
+    results = run(tmp_path, parts, 30.0, h, 1.2, 1e-4, 0.0, [200])
+    assert results.audit.entries["energy"].value < 1e-9
+    found = peaks(results["bodies/2/position"][:, 2] - 0.05)
+    square = found / np.append(0.3, found[:-1])
+    assert square == pytest.approx(square[0], abs=0.01)
+
+
 @pytest.mark.parametrize(("h", "tol"), [(0.01, 1e-6), (0.01, 1e-4), (0.005, 1e-4), (None, 1e-4)])
 def test_a_torus_that_has_rolled_on_its_rim_lies_flat(tmp_path, h, tol) -> None:
     """It rested tilted by up to 1.4e-3 rad on one of its corners, those across 0.3 mm above."""
