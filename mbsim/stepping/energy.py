@@ -27,7 +27,7 @@ from mbsim.core.layout import AT_W, BODY_SIZE
 from mbsim.core.rotation import add, dot, rotate, scale, sub, unrotate, vector
 from mbsim.dynamics.bodies.awake import bodies_awake, body_awake
 from mbsim.stepping.arrays import ASLEEP, LEFT_OPEN, POINTS, Stepping
-from mbsim.stepping.displacements import LANDS, is_hit
+from mbsim.stepping.displacements import LANDS, is_hit, shift_of
 from mbsim.stepping.one_point import direction, velocity_of
 
 
@@ -50,8 +50,14 @@ def left_by_forces(scene: Scene, S: Stepping, h: float) -> float:
         if S.rest.body[b, ASLEEP] == 1:
             continue
         before, v, shift = M.before[b], M.v[b], M.shift[b]
-        off = sub(vector(shift), scale(0.5, add(vector(before), vector(v))))
-        total += abs(h * dot(vector(scene.work.force[b]), off))
+        hit, work = is_hit(S, b), 0.0
+        for c in range(3):
+            off = shift[c] - 0.5 * (before[c] + v[c])
+            weight = scene.bodies.mass[b] * scene.world.gravity[c]
+            work += (scene.work.force[b, c] - weight) * off
+            # of what is hit, weight along the flight is in what contacts take
+            work += weight * (shift[c] - shift_of(S, b, c) if hit else off)
+        total += abs(h * work)
         w, u = vector(before, 3), vector(v, 3)
         free = sub(vector(M.free[b], 3), w)
         mean = scale(0.5, add(w, u))
