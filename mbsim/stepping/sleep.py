@@ -32,6 +32,7 @@ from mbsim.stepping.arrays import (
     KEPT_BODY_J,
     KEPT_CONTACT,
     KEPT_FORCE,
+    LENGTH,
     MAY_SLEEP,
     OWN_TIME,
     POINTS,
@@ -43,7 +44,7 @@ from mbsim.stepping.arrays import (
 )
 from mbsim.stepping.free_motion import stand
 from mbsim.stepping.kept import index_kept
-from mbsim.stepping.scales import left_of
+from mbsim.stepping.scales import left_of, noise_of
 
 #: Steps in a row in which a body has to be still, and for how long, over its group's own time L/V.
 CALM, LONG = 16, 0.25
@@ -177,6 +178,38 @@ def find_islands(scene: Scene, S: Stepping) -> None:
         if i != ground and j != ground:
             first, other = root_of(parent, i), root_of(parent, j)
             parent[max(first, other)] = min(first, other)
+
+
+@jitable
+def goes_nowhere(S: Stepping, b: int, h: float) -> bool:
+    """Return whether a body goes no way in a step h that counts as closing or slipping."""
+    before, g = S.motion.before[b], S.plan.connected[b]
+    most, length = noise_of(S, g, h), S.plan.scale[g, LENGTH]
+    for c in range(6):
+        if (1.0 if c < 3 else length) * abs(before[c]) > most:
+            return False
+    return True
+
+
+@jitable
+def find_still(scene: Scene, S: Stepping, h: float) -> None:
+    """Note the islands that go nowhere in a step, in `QUIET` of their first bodies."""
+    rest = S.rest
+    find_islands(scene, S)
+    for row in range(bodies_awake(scene)):
+        rest.body[body_awake(scene, row), QUIET] = 1
+    for row in range(bodies_awake(scene)):
+        b = body_awake(scene, row)
+        if not goes_nowhere(S, b, h):
+            rest.body[root_of(rest.parent, b), QUIET] = 0
+
+
+@jitable
+def is_still(S: Stepping, k: int) -> bool:
+    """Return whether `find_still` noted the island of point k."""
+    i, ground = S.points.body[k, 0], len(S.rest.body)
+    b = i if i != ground else S.points.body[k, 1]
+    return S.rest.body[root_of(S.rest.parent, b), QUIET] == 1
 
 
 @jitable

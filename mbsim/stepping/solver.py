@@ -38,6 +38,10 @@ FEW_SWEEPS, MOST_SWEEPS, FEW_POINTS = 40, 400, 64
 LOOKS = 8
 #: What impacts may leave at most, over what the solver may leave where nothing meets.
 MOST_LEFT = 10.0
+#: What sweeps change falls by a rate from one to the next, which is taken for less than the
+#: largest; what is left then may be so many times what may be left. A change below the least part
+#: of that is no sign of a rate.
+LARGEST_RATE, SLACK, EASY = 0.99, 5.0, 0.05
 #: How often the points of a pair are solved in one sweep at most.
 MOST_ROUNDS = 5
 #: A single point may be left so many times worse than the mean of them.
@@ -189,17 +193,28 @@ def go_on(p: Points, M: Motion, count: int, part: float, number: int) -> None:
 
 
 @jitable
+def what_follows(square: float, before: float) -> float:
+    """Return what all sweeps to come change, over what the last one did: 1 / (1/rate - 1).
+
+    The last one changed `square`, and the one before it `before`: rate^2 of that. In stacks the
+    rate is near 1, and what a sweep still changes says little.
+    """
+    rate = math.sqrt(square / before) if 0.0 < before else 1.0
+    rate = min(rate, LARGEST_RATE)
+    return rate / (1.0 - rate)
+
+
+@jitable
 def sweep_on(
     p: Points, M: Motion, count: int, may: tuple[float, float], most: int
 ) -> tuple[float, int, bool]:
     """Improve r and v of `count` points; return what a sweep still changes, sweeps, if solved.
 
     That is of a velocity, over what may be left of it, `least` of its point: `may` is a factor of
-    that, and the part of jumps. Sweeps end
-    where one of all pairs changes less than 1 in the square mean over what presses, and nowhere
-    more than `WORST`; or with `most`. Between them
-    impulses go on along the way of the sweeps before, as conjugate gradients do, which is dropped
-    where a sweep changes more than the last one.
+    that, and the part of jumps. Sweeps end where one of all pairs changes less than 1 in the square
+    mean over what presses, and nowhere more than `WORST`, and those to come would change no more
+    than `SLACK`; or with `most`. Between them impulses go on along the way of the sweeps before,
+    as conjugate gradients do, which is dropped where a sweep changes more than the last one.
     Source: M. Silcowitz, S. Niebe, K. Erleben, A nonsmooth nonlinear conjugate gradient method for
     interactive contact force problems, The Visual Computer 26 (2010) 893.
     """
@@ -215,10 +230,12 @@ def sweep_on(
         if sweeps % LOOKS == 1 and left > 1.0:
             let_jumps_count(p, M, count, may[0], may[1])
         solved = left <= 1.0 or (left <= WORST and mean <= 1.0)
+        square = gradient(p, count)
+        if solved and left > EASY:
+            solved = sweeps > 1 and mean * what_follows(square, before) <= SLACK
         if (solved and whole) or sweeps == most or not math.isfinite(left):
             break
         whole = solved or sweeps == most - 1
-        square = gradient(p, count)
         part = -1.0
         if sweeps == 1:
             part = 0.0

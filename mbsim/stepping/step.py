@@ -92,8 +92,8 @@ from mbsim.stepping.one_point import apply, fill_drift, velocity_of
 from mbsim.stepping.pairs import find_missed, find_points
 from mbsim.stepping.points import fill_answers, fill_point, fill_reach, way_at
 from mbsim.stepping.rebound import limit_rebound
-from mbsim.stepping.scales import group_at, left_of, noise_of
-from mbsim.stepping.sleep import wake_loaded
+from mbsim.stepping.scales import closer, group_at, left_of, noise_of
+from mbsim.stepping.sleep import find_still, is_still, wake_loaded
 from mbsim.stepping.solver import move_farther, project_positions, solve_points
 
 #: How often a step is solved at most, as what stuck slips.
@@ -172,11 +172,14 @@ def prepare_points(scene: Scene, S: Stepping, h: float) -> int:
         begin += P.many[k] if P.wide[k] >= 0 else 0
     fill_answers(scene, S)
     recall(S, h)
+    find_still(scene, S, h)
     for k in range(count):
         x, z = velocity_of(P, k, 1, M.before), velocity_of(P, k, 2, M.before)
         slip, row = math.sqrt(x * x + z * z), P.was[k]
         g = group_at(S, k)
         P.speed[k], P.least[k] = S.plan.scale[g, SPEED], left_of(S, g, h)
+        if is_still(S, k):
+            P.least[k] = closer(S, g, h)
         if row >= 0 and slip <= noise_of(S, g, h):
             # what stuck moves by what the solver left of it
             slip = 0.0 if S.kept.table[row, KEPT_STICKS] == 1.0 else slip

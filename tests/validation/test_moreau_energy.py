@@ -130,22 +130,20 @@ def test_a_belt_drags_with_the_work_of_its_friction(tmp_path: Path, h: float) ->
     assert results.audit.warnings == ()
 
 
-def test_energy_that_a_coarse_tol_leaves_is_laid_to_the_step(tmp_path: Path) -> None:
-    """A rigid contact has no force without a potential, so that is not what is said of it."""
-    size = text.attributes(type="Cylinder", radius=0.1, length=0.1)
-    turns, graphics, parts = (1.0 / 300.0, 1.0 / 300.0, 0.005), [], [text.gravity()]
-    for k in range(6):
-        number, foot = 2 + k, (0.002 * k, 0.0, 0.1 * k)
-        graphics.append(100 * number)
-        parts += [
-            text.body(number, 1.0, turns, (foot[0], 0.0, foot[2] + 0.05)),
-            text.marker(10 * number + 1, number, foot),
-            f'<Post_Graphic id="{100 * number}" center_marker_id="{10 * number + 1}" {size}/>',
+def test_energy_that_a_coarse_step_leaves_is_laid_to_it(tmp_path: Path) -> None:
+    """A rigid contact has no force without a potential, so that is not what is said of it.
+
+    Columns of cubes, 1 mm apart, that bounce on each other.
+    """
+    law, edge, said = text.impact(1e5, 1.0, 30.0, 1e-5) | text.coulomb(0.5, 1e-3), 0.2, []
+    for count in (8, 9, 10):
+        cubes = [
+            text.cuboid(2 + k, 1.0, (edge,) * 3, (0.0, 0.0, (k + 0.5) * edge + 1e-3 * (k + 1)))
+            for k in range(count)
         ]
-    law = decks.rubbed(0.5)
-    parts += [text.contact(301, graphics, [100], **law)]
-    parts += [text.contact(302, graphics, graphics, **law)]
-    model = decks.model(tmp_path, parts, 3.0, 1e-2)
-    said = mbsim.simulate(model, integrator="MOREAU", tol=1e-2).audit.warnings
+        ids = [100 * (2 + k) for k in range(count)]
+        contacts = [text.contact(301, ids, [100], **law), text.contact(302, ids, ids, **law)]
+        model = decks.model(tmp_path, [*cubes, *contacts, text.gravity()], 3.0, 5e-3, 5e-3)
+        said += mbsim.simulate(model, integrator="MOREAU", tol=1e-3).audit.warnings
     assert any("choose a shorter one" in line for line in said)
     assert not any("meshes" in line for line in said)
