@@ -122,7 +122,8 @@ def run(deck: Model, setting: Setting, repeats: int, limit: float) -> Outcome:
             deck, integrator=setting.integrator, tol=setting.tol, progress=_stop_after(limit)
         )
         walls.append(float(results.stats["loop_s"]))
-    return outcome(results, statistics.median(walls))
+    note = "rigid contacts" if setting.integrator == "MOREAU" else ""
+    return outcome(results, statistics.median(walls), note)
 
 
 def _stop_after(limit: float) -> Callable[[float, float, float], None]:
@@ -136,8 +137,8 @@ def _stop_after(limit: float) -> Callable[[float, float, float], None]:
     return progress
 
 
-def outcome(results: Results, wall_s: float) -> Outcome:
-    """Return results as an outcome, bodies by id."""
+def outcome(results: Results, wall_s: float, note: str = "") -> Outcome:
+    """Return results as an outcome, bodies by id; the note says what law a method solves."""
     bodies = sorted(results.ids("bodies"))
 
     def rows(name: str) -> np.ndarray:
@@ -158,7 +159,7 @@ def outcome(results: Results, wall_s: float) -> Outcome:
         rows("velocity"),
         rows("angular_velocity"),
         extra,
-        note="",
+        note=note,
     )
 
 

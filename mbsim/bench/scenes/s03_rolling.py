@@ -16,6 +16,10 @@ LAW = p.ImpactLaw(k=1e8, e=1.5, c=200.0, dmax=1e-4)
 TRANSITION = 0.02  # m/s, of the smoothed friction
 #: Static equilibrium: k d^e = m g.
 DEPTH = (p.S3.mass * p.GRAVITY / LAW.k) ** (1.0 / LAW.e)
+#: Fixed steps of MOREAU [s]; without one it finds them by error.
+STEPS = (1e-1, 4e-2, 2e-2, 1e-2, 5e-3)
+#: The variant whose contacts are rigid, and whose friction is Coulomb's.
+RIGID = "rigid"
 
 
 def _deck(variation: Variation) -> str:
@@ -30,6 +34,7 @@ def _deck(variation: Variation) -> str:
             text.sphere(2, p.S3.mass, p.S3.radius, place, speed),
             text.contact(301, [200], [100], **law),
             text.gravity(),
+            *text.fixed_step(variation),
         ],
         p.S3.end_time,
     )
@@ -66,17 +71,19 @@ def law_solution(lever: float) -> float:
 def _errors(outcome: Outcome, variant: str) -> dict[str, float]:
     """Return errors of place, speed and onset of rolling, all against rigid Coulomb friction.
 
-    `x_law` is the place against the solution of our own law, at the contact point that it
-    uses: half of the depth above the deepest point.
+    `x_law` is the place against the solution of the law that a method solves: the rigid one,
+    or our smoothed one at the contact point that it uses, half of the depth above the deepest.
     """
     x = outcome.position[:, 0, 0] - outcome.position[0, 0, 0]
     v = outcome.velocity[:, 0, 0]
     slip = np.abs(v - outcome.angular_velocity[:, 0, 1] * p.S3.radius)
     rolls = np.flatnonzero(slip < 1e-3 * p.S3.speed)
     onset = float(outcome.time[rolls[0]]) if len(rolls) else math.nan
+    rigid = variant == RIGID
+    own = p.S3.end_x if rigid else law_solution(p.S3.radius - 0.5 * DEPTH)
     return {
         "x_abs": abs(float(x[-1]) - p.S3.end_x),
-        "x_law": abs(float(x[-1]) - law_solution(p.S3.radius - 0.5 * DEPTH)),
+        "x_law": abs(float(x[-1]) - own),
         "v_rel": abs(float(v[-1]) - p.S3.roll_speed) / p.S3.speed,
         "t_roll_abs": abs(onset - p.S3.roll_time),
     }
@@ -94,5 +101,7 @@ SCENES = (
         own_measure="x_law",
         targets=(Target(1 / 20, up_to=2e-4), Target(1 / 2)),
         second=("x_law", "against its own law, which is what counts"),
+        variants=("smoothed", RIGID),
+        variations=({}, *({"h": h} for h in STEPS)),
     ),
 )

@@ -14,7 +14,7 @@ from mbsim.bench.scene import Scene, Target, Variation
 #: Critical damping of 1 kg: contacts of the peers do not rebound either.
 LAW = p.ImpactLaw(k=1e6, e=1.0, c=2e3, dmax=1e-4)
 TRANSITION = 0.01  # m/s, of the smoothed friction
-STEPS = (1e-2, 5e-3, 2e-3)  # s, of rigid contact
+STEPS = (2e-2, 1e-2, 5e-3, 2e-3)  # s, of rigid contact
 
 
 def _graphic(number: int, marker: int) -> str:

@@ -18,7 +18,7 @@ EXACT = ("RADAU5", 1e-7)
 BACK = ((0.0, 0.0, -1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
 ALONG_Y = ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0))
 #: Fixed steps of MOREAU [s]; without one it finds them by error.
-STEPS = (1e-2, 5e-3, 2e-3, 1e-3)
+STEPS = (5e-2, 2e-2, 1e-2, 5e-3, 2e-3, 1e-3)
 
 
 def _cylinder(number: int, x: float) -> list[str]:

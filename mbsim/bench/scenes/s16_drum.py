@@ -22,7 +22,7 @@ DMAX, TRANSITION = 1e-5, 0.02
 #: Stiffness of the contacts [N/m]: the softest lets single impacts go deeper than `PASS`.
 STIFFNESSES = (1e5, 3e5, 1e6)
 #: Fixed steps of MOREAU [s], of which a row every 20 ms is a multiple.
-STEPS = (1e-2, 5e-3, 2e-3, 1e-3)
+STEPS = (2e-2, 1e-2, 5e-3, 2e-3, 1e-3)
 #: What carries the drum: a bushing [N/m], for a method for free bodies knows its stiffness.
 CARRIED = 1e9
 
