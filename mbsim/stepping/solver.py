@@ -41,7 +41,7 @@ MOST_LEFT = 10.0
 #: What sweeps change falls by a rate from one to the next, which is taken for less than the
 #: largest; what is left then may be so many times what may be left. A change below the least part
 #: of that is no sign of a rate.
-LARGEST_RATE, SLACK, EASY = 0.99, 5.0, 0.05
+LARGEST_RATE, SLACK, EASY = 0.99, 10.0, 0.05
 #: How often the points of a pair are solved in one sweep at most.
 MOST_ROUNDS = 5
 #: A single point may be left so many times worse than the mean of them.
