@@ -34,6 +34,7 @@ from mbsim.sensitivity.arrays import (
     ERROR_TO_WALL,
     MOST,
     PART_TO_WALL,
+    REMEMBERED,
     WALL,
     Variations,
 )
@@ -47,7 +48,8 @@ ROUGHEST = 1e-5
 #: A part is no more than so many times as long as the one before, and no less than this part of it;
 #: what is left of a stretch is taken in one where it is no more than so much longer.
 LONGEST, LEAST, EASY = 1000.0, 0.1, 1.1
-#: The same of GALPHA, where the order is chosen by how long parts last.
+#: The same of GALPHA, where the order is chosen by how long parts last, and where friction
+#: remembers, where errors of short parts are rounding.
 MOST_LASTING = 4.0
 #: A step of GALPHA that takes so many parts of order 3 would take fewer of order 5; one that is one
 #: part of order 5, which might be so many times as long, is one of order 3.
@@ -211,7 +213,8 @@ def integrate(
         return 0
     tries, taken, before = 0, 0, 0.0
     row = OF_THIRD if V.words[ALONG] == 1 and V.fifth[k] == 0 else OF_FIFTH
-    most_longer = MOST_LASTING if V.words[ALONG] == 1 else LONGEST
+    often = V.words[ALONG] == 1 or V.words[REMEMBERED] > 0
+    most_longer = MOST_LASTING if often else LONGEST
     part = first_part(V, k, way, width, begun)
     while q < 1.0:
         tries += 1
