@@ -175,7 +175,6 @@ class Sensitivities:
                     base.append(float(own.ravel()[k]))
                     slope.append(float(table.ravel()[k]))
             first.append(len(place))
-        rows = len(scene.rows.time)
         held = at.HELD if shape[1] else 0
         return Variations(
             words=np.zeros(at.WORDS, dtype=np.int64),
@@ -242,7 +241,7 @@ class Sensitivities:
             base=np.array(base),
             rise=np.array(slope),
             **_of_jumps(count, n),
-            step=np.zeros((rows, count)),
+            step=np.zeros((len(scene.rows.time), count)),
         )
 
     def hooked(self, problem: Problem) -> Problem:
