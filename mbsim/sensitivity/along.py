@@ -13,14 +13,11 @@ import math
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, view
 from mbsim.core.arrays import F1
-from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.integrators.scheme import Method, in_workspace
 from mbsim.sensitivity.arrays import (
     ALIKE,
-    ALONG,
     APART,
-    ASKED,
     BEGINS,
     DOWN_SIDE,
     ENDS,
@@ -29,17 +26,15 @@ from mbsim.sensitivity.arrays import (
     LINE_F,
     LINE_Y,
     LONG,
-    MOST,
     MOST_PARTS,
     ODD,
-    REMEMBERED,
     STRAIGHT,
     TWIN,
     UP,
     WAY,
     Variations,
 )
-from mbsim.sensitivity.tableaus import DENSE, LAST, OF_FIFTH, OF_THIRD, ORDER, A, C, E
+from mbsim.sensitivity.tableaus import DENSE, LAST, A, C, E
 from mbsim.sensitivity.twin import (
     keep_change,
     keep_depths,
@@ -50,23 +45,14 @@ from mbsim.sensitivity.twin import (
 #: Rows of `Variations.work`: a point, f on either side, D at a stage, its slopes.
 POINT, UPPER, LOWER, STAGE, FIRST = range(5)
 SECOND, THIRD, WORK = FIRST + 1, FIRST + 2, FIRST + 7
-#: After so many tries that led no farther than this part of a stretch less is asked for; the
-#: shortest part of a step.
-MANY_PARTS, PROGRESS, SHORTEST = 60, 0.01, 1e-9
-#: What the error of such a part may be, over that of a step.
-BENT_ENOUGH = 0.2
-#: What is no longer taken for rounding.
-ROUGHEST = 1e-5
 #: A stretch of the step: its begin and end, and how its parts are taken.
 Span = tuple[float, float, int]
 #: Evenly; or the more slowly the nearer to its begin or end, where a touch begins or ends: forces
 #: are powers of depths that are no whole numbers, and bend smoothly over the root of the time.
 EVEN, SOFT_BEGIN, SOFT_END = range(3)
-#: A step of GALPHA that takes so many parts of order 3 would take fewer of order 5; one that is one
-#: part of order 5, which might be so many times as long, is one of order 3.
-MANY, LONGER = 3, 2.5
-#: Parts of a stretch by which its ends are left, until both sides of a difference touch alike.
-NEAREST, FARTHER = 1e-12, 4.0
+#: Parts of a stretch by which its ends are left, until both sides of a difference touch alike; up
+#: to which that is less than what a smaller difference is off by.
+NEAREST, FARTHER, NEAR = 1e-12, 4.0, 1e-3
 #: A difference is no smaller than this part of the usual one.
 LEAST = 1e-4
 
@@ -134,12 +120,15 @@ def clear_slope(
         if code != 0 or V.words[ALIKE] == V.words[ALIKE + 1]:
             V.line[APART] = off
             return code
-        if off >= 0.5:
-            # a stretch so short that a smaller difference, which is less exact, matters little
+        if off < NEAR:
+            off = min(NEAR, FARTHER * off)
+        elif step > LEAST * e:
+            # a touch may be no deeper than both sides are apart
             step *= 0.1
-            if step < LEAST * e:
-                return 0
-        off = min(0.5, FARTHER * off)
+        elif off < 0.5:
+            off = min(0.5, FARTHER * off)
+        else:
+            return 0
 
 
 @jitable
@@ -261,95 +250,6 @@ def value_within(V: Variations, k: int, s: float) -> float:
     for i in range(V.next.shape[1]):
         V.next[k, i] = c[0, i] + x * (c[1, i] + r * (c[2, i] + x * (c[3, i] + r * c[4, i])))
     return about[IS_LATER]
-
-
-@jitable
-def is_too_much(V: Variations) -> bool:
-    """Return whether derivatives have taken all the evaluations that they are worth."""
-    return V.words[MOST] > 0 and V.words[ASKED] > V.words[MOST]
-
-
-@jitable
-def first_part(V: Variations, k: int, way: int, width: float, begun: bool) -> float:
-    """Return what part of a stretch is tried first; let a known first slope be one over q."""
-    if begun:
-        for i in range(V.next.shape[1]):
-            V.work[FIRST, i] *= pace(way, 0.0) * width
-    V.line[APART] = NEAREST
-    return min(1.0, V.lasted[k] / width) if way == EVEN and V.lasted[k] > 0.0 else 1.0
-
-
-@jitable
-def choose_order(V: Variations, k: int, taken: int, width: float) -> None:
-    """Choose the order of parts of the next step of GALPHA from how many were taken in this one."""
-    if V.fifth[k] == 0 and taken >= MANY:
-        V.fifth[k], V.lasted[k] = 1, 0.0
-    elif V.fifth[k] == 1 and taken == 1 and V.lasted[k] > LONGER * width:
-        V.fifth[k], V.lasted[k] = 0, 0.0
-
-
-@jitable
-def integrate(
-    V: Variations,
-    scene: Scene,
-    t: float,
-    h: float,
-    k: int,
-    span: Span,
-    e: float,
-    begun: bool,
-    later: float,
-) -> int:
-    """Carry the derivative in `next` through a stretch of the step; return a code.
-
-    By an explicit method, as exactly as `enough` asks. Where forces bend the steps get short. Its
-    first slope is left in `work`, of the end, as it may be there where the step has begun. `later`
-    is kept with the polynomials of its parts.
-    """
-    begin, end, way = span
-    w, d, q, most = V.work, V.next[k], 0.0, V.enough[0]
-    width = (end - begin) * h
-    if width <= 0.0:
-        return 0
-    tries, taken, before = 0, 0, 0.0
-    row = OF_THIRD if V.words[ALONG] == 1 and V.fifth[k] == 0 else OF_FIFTH
-    if V.words[ALONG] == 0 and V.words[REMEMBERED] == 0:
-        # forces of impacts bend there: what is left of places becomes speeds
-        most *= BENT_ENOUGH
-    part = first_part(V, k, way, width, begun)
-    while q < 1.0:
-        tries += 1
-        if is_too_much(V):
-            return Code.NOT_CONVERGED
-        if tries % MANY_PARTS == 0:
-            if q - before < PROGRESS:
-                # what is left is rounding of forces
-                most *= 10.0
-                if most > ROUGHEST:
-                    return Code.NOT_CONVERGED
-            before = q
-        last = q + 1.0001 * part >= 1.0
-        part = 1.0 - q if last else part
-        code, error = try_part(V, scene, t, h, k, span, (q, part), e, row, begun)
-        if code != 0:
-            return code
-        begun = True
-        longer = min(4.0, max(0.1, 0.9 * (most / max(error, 1e-12)) ** (1.0 / ORDER[row])))
-        if error <= most or part * width <= max(SHORTEST * h, 1e-15 * abs(t)):
-            keep_part(V, k, span, q, part, later, row)
-            taken += 1
-            for i in range(len(d)):
-                d[i], w[FIRST, i] = w[STAGE, i], w[FIRST + LAST[row], i]
-            q = 1.0 if last else q + part
-            if way == EVEN:
-                V.lasted[k] = part * width * longer
-        part *= longer
-    if V.words[ALONG] == 1 and way == EVEN:
-        choose_order(V, k, taken, width)
-    faster = pace(way, 1.0) * width
-    for i in range(len(d)):
-        w[FIRST, i] = w[FIRST, i] / faster if faster > 0.0 else 0.0
-    return 0
 
 
 @jitable

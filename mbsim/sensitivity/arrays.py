@@ -65,6 +65,9 @@ COUNT, SURE, LIST = range(3)
 APART = 1
 #: How fast f changed in the last step, in usual sizes.
 USUAL_CHANGE = 2
+#: Where a part of a stretch ended that was too long, how long it was, its error over what that may
+#: be; between which parts of a stretch f bends.
+WALL, PART_TO_WALL, ERROR_TO_WALL, BEND, BEHIND_BEND = range(3, 8)
 #: Numbers of a row of `Variations.later`: at the begin of the last step, behind it.
 LAST_UNTIL, LAST_ON = range(2)
 #: Numbers of a row of `Variations.shown`: part of the last step, `later` there.
@@ -108,6 +111,7 @@ class Variations(NamedTuple):
     error: tags.Scratch[F1]  # (P,) of the last step, over the derivative
     enough: tags.Constant[F1]  # (2,) how large that may be; LEFT
     rate: F1  # (P,) how much smaller corrections of an implicit method's stages got, one by one
+    moved: F1  # (P,) what the first of them was in the last step, over the derivative
     stale: I1  # (P,) 1 where the run's linearisation was too old for it in the last step
     # (P, 4, n) a, v', v'' and v''' of a derivative in the last step of GALPHA, see `generalised`;
     # (P,) in how many steps in a row D' was found, up to what is needed
@@ -123,7 +127,7 @@ class Variations(NamedTuple):
     reach: F1  # (P,) by how much a parameter may be changed for depths, 0: not known
     odd: tags.Scratch[I2]  # (2, ns) 1 where friction asks for another branch beside the run
     depth: tags.Scratch[F2]  # (3, ns) how deep slots are at the end of a step, rows as of `far`
-    # (3,) length of the straight line [T]; APART, USUAL_CHANGE
+    # (8,) length of the straight line [T]; APART, USUAL_CHANGE, WALL and what follows
     line: tags.Scratch[F1]
     # (P, ns + 1) by how much slots change their branch later, by the parameter; what else does last
     shift: tags.Scratch[F2]

@@ -25,7 +25,6 @@ from mbsim.sensitivity.along import (
     SOFT_END,
     THIRD,
     UPPER,
-    integrate,
     point_at,
 )
 from mbsim.sensitivity.arrays import (
@@ -41,6 +40,7 @@ from mbsim.sensitivity.arrays import (
 )
 from mbsim.sensitivity.branches import ANY_BRANCH, branch_of, find_change, tells
 from mbsim.sensitivity.later import add_motion, touch_later
+from mbsim.sensitivity.stretches import integrate
 from mbsim.sensitivity.twin import set_parameter, step_along_motion
 
 #: A change is looked for within so many lengths of a step of where the run has it.

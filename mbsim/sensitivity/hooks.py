@@ -29,7 +29,7 @@ from mbsim.integrators.scheme import (
     Method,
     in_workspace,
 )
-from mbsim.sensitivity.along import is_too_much, project_end, remember_end, value_within
+from mbsim.sensitivity.along import project_end, remember_end, value_within
 from mbsim.sensitivity.arrays import (
     ALONG,
     ASKED,
@@ -90,6 +90,7 @@ from mbsim.sensitivity.hidden import find_hidden
 from mbsim.sensitivity.implicit import implicit_step
 from mbsim.sensitivity.later import UNKNOWN, add, add_motion, give_up, go_on, is_steady, pays
 from mbsim.sensitivity.reintegration import hold, make_sure
+from mbsim.sensitivity.stretches import is_too_much
 from mbsim.sensitivity.timed import begin_unseen, clear_time, look_behind, make_room
 from mbsim.sensitivity.twin import (
     half_step,

@@ -63,11 +63,13 @@ IN_IMPACT, COLLIDING = 0.02, 1e-6
 #: Where a correction is more than POOR of that before, the twin is linearised in the step itself.
 #: The iteration fails after so many, and where a correction is more than SLOW of that before even
 #: then: the linearisation is that of other forces.
-POOR, MOST, SLOW = 0.1, 12, 0.5
+POOR, MOST, SLOW = 0.03, 12, 0.5
 #: How fast corrections get smaller is trusted less from step to step while one is all there is
-#: (Hairer and Wanner, section IV.8), the less where there are contacts, whose forces bend; what it
-#: is with another linearisation is not known.
-FORGET, FORGET_OF_CONTACTS, LEAST_RATE, UNKNOWN = 0.9, 0.8, 1e-6, 0.1
+#: (Hairer and Wanner, section IV.8), the less where friction remembers, whose forces bend, and far
+#: less where the first one is so many times that of the step before; what it is with another
+#: linearisation is not known.
+FORGET, FORGET_OF_MEMORY, LEAST_RATE, UNKNOWN = 0.9, 0.8, 1e-6, 0.1
+FORGET_AT_ONCE, SURPRISING = 0.5, 10.0
 #: Corrections that get no smaller are rounding where they are less than so much of y in sides of a
 #: difference.
 ROUNDING = 4e-15
@@ -252,7 +254,7 @@ def solve_stages(
     before, largest = math.inf, 1.0
     for i in range(len(m.y)):
         largest = max(largest, abs(m.y[i]) / V.scale[i])
-    rate = V.rate[k] ** (FORGET_OF_CONTACTS if len(scene.contacts.id) > 0 else FORGET)
+    rate = V.rate[k] ** (FORGET if V.words[REMEMBERED] == 0 else FORGET_OF_MEMORY)
     rounding, left = ROUNDING / abs(e) * largest, V.enough[LEFT]
     if V.words[COLLIDES] == 1 and V.words[REMEMBERED] == 0:
         left *= IN_IMPACT
@@ -263,7 +265,11 @@ def solve_stages(
         size, whole = moved(V, k)
         if not size < math.inf:
             break
-        if before < math.inf:
+        if before == math.inf:
+            if size > SURPRISING * V.moved[k] * whole:
+                rate = rate**FORGET_AT_ONCE
+            V.moved[k] = size / whole
+        else:
             now = min(size / before, 0.99) if before > 0.0 else 0.0
             # of what is rounded no rate is known but that it is no larger
             rate = now if size > rounding else min(now, rate)

@@ -175,7 +175,6 @@ class Sensitivities:
                     base.append(float(own.ravel()[k]))
                     slope.append(float(table.ravel()[k]))
             first.append(len(place))
-        rows = len(scene.rows.time)
         held = at.HELD if shape[1] else 0
         return Variations(
             words=np.zeros(at.WORDS, dtype=np.int64),
@@ -195,6 +194,7 @@ class Sensitivities:
             error=np.zeros(count),
             enough=_enough(self.system, tol),
             rate=np.full(count, 0.99),
+            moved=np.zeros(count),
             carried=np.zeros((count, 4, n)),
             bend=np.zeros((count, n)),
             jump=np.zeros((5, n)),
@@ -204,7 +204,7 @@ class Sensitivities:
             reach=np.zeros(count),
             depth=np.zeros((3, shape[0])),
             odd=np.zeros((2, shape[0]), dtype=np.int64),
-            line=np.zeros(3),
+            line=np.zeros(8),
             shift=np.zeros((count, shape[0] + 1)),
             times=np.zeros((count, shape[0] + 1, 3)),
             asks=np.zeros(shape[0] + 1, dtype=np.int64),
@@ -241,7 +241,7 @@ class Sensitivities:
             base=np.array(base),
             rise=np.array(slope),
             **_of_jumps(count, n),
-            step=np.zeros((rows, count)),
+            step=np.zeros((len(scene.rows.time), count)),
         )
 
     def hooked(self, problem: Problem) -> Problem:

@@ -24,23 +24,27 @@ def cost(deck, integrator, names, **how):
     ("deck", "integrator", "names", "most"),
     [
         ("free_top", "DOPRI5", INERTIAS[:1], 1.1),
-        ("free_top", "DOP853", INERTIAS[:1], 1.4),
-        ("free_top", "RADAU5", INERTIAS[:1], 0.8),
-        ("bowling_ball", "DOPRI5", ["Body_Rigid[2].v_ic_x"], 1.3),
-        ("bowling_ball", "RADAU5", ["Body_Rigid[2].v_ic_x"], 0.8),
-        ("sdnd100", "DOPRI5", [f"{CONTACT}.mu_dynamic"], 1.6),
-        ("sdnd100", "DOP853", [f"{CONTACT}.mu_dynamic"], 1.4),
-        ("sdnd100", "RADAU5", [f"{CONTACT}.mu_dynamic"], 0.9),
+        ("free_top", "DOP853", INERTIAS[:1], 1.3),
+        ("free_top", "RADAU5", INERTIAS[:1], 0.75),
+        ("bowling_ball", "DOPRI5", ["Body_Rigid[2].v_ic_x"], 1.15),
+        ("bowling_ball", "RADAU5", ["Body_Rigid[2].v_ic_x"], 0.75),
+        ("sdnd100", "DOPRI5", [f"{CONTACT}.mu_dynamic"], 1.5),
+        ("sdnd100", "DOP853", [f"{CONTACT}.mu_dynamic"], 1.3),
+        ("sdnd100", "RADAU5", [f"{CONTACT}.mu_dynamic"], 0.8),
         # what it sticks by is new to the linearisation that the run goes on with
-        ("belt_stick_slip", "RADAU5", [f"{CONTACT}.mu_static"], 1.3),
-        ("belt_stick_slip", "DOPRI5", [f"{CONTACT}.mu_static"], 1.6),
-        ("belt_stick_slip", "DOP853", [f"{CONTACT}.mu_static"], 1.7),
+        ("belt_stick_slip", "RADAU5", [f"{CONTACT}.mu_static"], 1.2),
+        ("belt_stick_slip", "DOPRI5", [f"{CONTACT}.mu_static"], 1.45),
+        ("belt_stick_slip", "DOP853", [f"{CONTACT}.mu_static"], 1.45),
         # one evaluation a step, where the run takes three
         ("free_top", "GALPHA", INERTIAS[:1], 0.4),
         ("bowling_ball", "GALPHA", ["Body_Rigid[2].v_ic_x"], 0.6),
         ("sdnd100", "GALPHA", [f"{CONTACT}.mu_dynamic"], 0.8),
-        ("belt_stick_slip", "GALPHA", [f"{CONTACT}.mu_static"], 0.6),
-        ("bouncing_sphere", "GALPHA", ["Reference_Marker[20].pos_z"], 0.8),
+        ("belt_stick_slip", "GALPHA", [f"{CONTACT}.mu_static"], 0.5),
+        ("bouncing_sphere", "GALPHA", ["Reference_Marker[20].pos_z"], 0.75),
+        # its force bends within every impact, where damping has brought it to zero
+        ("bouncing_sphere", "RADAU5", ["Reference_Marker[20].pos_z"], 1.6),
+        ("bouncing_sphere", "DOPRI5", ["Reference_Marker[20].pos_z"], 2.7),
+        ("bouncing_sphere", "DOP853", ["Reference_Marker[20].pos_z"], 3.1),
     ],
 )
 def test_a_parameter_takes_no_more_than_the_manual_says(deck, integrator, names, most):
@@ -50,12 +54,13 @@ def test_a_parameter_takes_no_more_than_the_manual_says(deck, integrator, names,
 @pytest.mark.parametrize(
     ("deck", "integrator", "names", "most"),
     [
-        ("sdnd100", "RADAU5", [f"{CONTACT}.mu_dynamic", "Body_Rigid[2].mass"], 1.1),
-        ("sdnd100", "GALPHA", [f"{CONTACT}.mu_dynamic", "Body_Rigid[2].mass"], 1.4),
-        ("belt_stick_slip", "RADAU5", [f"{CONTACT}.mu_static", f"{CONTACT}.mu_dynamic"], 0.9),
-        ("belt_stick_slip", "GALPHA", [f"{CONTACT}.mu_static", f"{CONTACT}.mu_dynamic"], 0.6),
+        ("sdnd100", "RADAU5", [f"{CONTACT}.mu_dynamic", "Body_Rigid[2].mass"], 1.0),
+        ("sdnd100", "GALPHA", [f"{CONTACT}.mu_dynamic", "Body_Rigid[2].mass"], 1.3),
+        ("belt_stick_slip", "RADAU5", [f"{CONTACT}.mu_static", f"{CONTACT}.mu_dynamic"], 0.75),
+        ("belt_stick_slip", "GALPHA", [f"{CONTACT}.mu_static", f"{CONTACT}.mu_dynamic"], 0.5),
         # its derivative by the mass vibrates faster than the motion
-        ("bowling_ball", "GALPHA", ["Body_Rigid[2].v_ic_x", "Body_Rigid[2].mass"], 2.9),
+        ("bowling_ball", "GALPHA", ["Body_Rigid[2].v_ic_x", "Body_Rigid[2].mass"], 2.3),
+        ("bouncing_sphere", "RADAU5", ["Reference_Marker[20].pos_z", "Body_Rigid[2].mass"], 1.0),
     ],
 )
 def test_a_further_parameter_takes_no_more_than_the_manual_says(deck, integrator, names, most):
