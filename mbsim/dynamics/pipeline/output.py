@@ -287,13 +287,13 @@ def carried_error(scene: Scene, e: F1, s: int) -> float:
         force = math.hypot(row[ALONG_X], row[ALONG_Y])
         across = row[ALONG_X] * e[at + 1] - row[ALONG_Y] * e[at]
         return row[UNIT] * across / force if force > 0.0 else 0.0
-    square = 0.0
+    square, bent = 0.0, 0.0
     for j in range(scene.contacts.carried[contact_of(scene, s)]):
         square += e[at + j] * e[at + j]
+        bent += scene.work.memory[s, j] ** 2
     part = 1.0
     if scene.state.touching[s] == 0 and row[BRANCH] == 0.0:
-        bend = math.hypot(scene.work.memory[s, 0], scene.work.memory[s, 1])
-        pull = slipping_mass(scene, s) * (row[UNIT] / LASTS) ** 2 * bend
+        pull = slipping_mass(scene, s) * (row[UNIT] / LASTS) ** 2 * math.sqrt(bent)
         force = math.hypot(row[ALONG_X], row[ALONG_Y])
         part = force / pull if pull > force else 1.0
     return part * row[UNIT] * math.sqrt(square)
