@@ -38,6 +38,8 @@ FEW, HOPELESS, FAST, GROWTH = 20_000, 1e7, 1e6, 100.0
 ENDLESS, ROWLESS = 1e11, 1e9
 #: Steps are the same where their mean is this many times that of them and as many before, at most.
 STEADY = 1.2
+#: Steps whose mean is more than this part of `h_max` are bounded by that: others end at rows.
+AS_LONG = 0.5
 #: Part of the time that has passed over which speeds are compared.
 LATELY = 0.01
 _NAMES = ("displacement", "velocity", "acceleration")
@@ -75,8 +77,11 @@ class Pace:
         """Go back to a checkpoint of the same Simulate."""
         self.seen = deque((int(n), float(t), float(v)) for n, t, v in saved["pace/seen"])
 
-    def watch(self, system: System, y: Any, t: float, steps: int) -> None:
-        """Note where the run is at time t; raise SolverError where it gets nowhere."""
+    def watch(self, system: System, y: Any, t: float, steps: int, h_max: float) -> None:
+        """Note where the run is at time t; raise SolverError where it gets nowhere.
+
+        `h_max` is the longest step that the deck, or a sensor, allows.
+        """
         speed = _fastest(system, y)
         self.seen.append((steps, t, speed))
         passed = t - self.start
@@ -90,10 +95,12 @@ class Pace:
             if speed > max(FAST * system.scene.world.scale[SCALE_SPEED], GROWTH * before):
                 _give_up(system, y, t, pace, "the motion leaves all bounds", "")
         if pace is not None and self._is_endless(pace, t):
-            _give_up(system, y, t, pace, "the run would take days", _hurried(system, y, t))
+            where = _bounded(pace, h_max) or _hurried(system, y, t)
+            _give_up(system, y, t, pace, "the run would take days", where)
         pace = self._pace(STALLED)
         if pace is not None and pace < SLIVER * passed:
-            _give_up(system, y, t, pace, "the run would not end", _pressed(system))
+            where = _bounded(pace, h_max) or _pressed(system)
+            _give_up(system, y, t, pace, "the run would not end", where)
 
     def _is_endless(self, pace: float, t: float) -> bool:
         """Return whether so many steps are to come that it is no matter of waiting.
@@ -137,6 +144,11 @@ def _give_up(system: System, y: Any, t: float, pace: float, why: str, where: str
         f"no progress at time {t:.9g}: steps are {pace:.3g} on average and {why}; "
         f"{where or _culprit(system, y, t)}. Results up to there are kept."
     )
+
+
+def _bounded(pace: float, h_max: float) -> str:
+    """Return what is to be said of steps that are as long as they may be, "" for others."""
+    return f"h_max={h_max:g} allows no longer ones" if pace > AS_LONG * h_max else ""
 
 
 def _pressed(system: System) -> str:

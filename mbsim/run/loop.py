@@ -465,7 +465,7 @@ class Runner:
             )
         now, steps = float(memory[scheme.TIME]), int(counts[scheme.STEPS])
         if outcome == problem.WATCH_DUE:
-            self.pace.watch(self.system, self.method.y, now, steps)
+            self.pace.watch(self.system, self.method.y, now, steps, self.sensing.h_max)
         if outcome == problem.TABLE_OVER:
             self.timetable.write(self.method.timetable, now, end)
             counts[scheme.ROW] = 0

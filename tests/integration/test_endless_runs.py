@@ -22,6 +22,7 @@ DECK = """<MotionSolve><Model>
 </Model><Command>
 <Simulate analysis_type="Transient" end_time="2" print_interval="0.01"/>
 </Command></MotionSolve>"""
+BOUNDED = DECK.replace("<Simulate", '<Param_Transient h_max="1e-13"/><Simulate')
 MOVING = 'v_ic_x="1" v_ic_x_flag="TRUE"'
 
 
@@ -41,6 +42,13 @@ def test_a_run_that_would_take_days_ends_at_once(begin, force, who, tmp_path):
     with mbsim.open_results(kept) as results:
         assert results.stats["steps"] <= 3 * FEW
         assert len(results["time"]) == 1
+
+
+@pytest.mark.parametrize("integrator", ["DOPRI5", "RADAU5", "AUTO"])
+def test_steps_that_h_max_bounds_are_said_to_be_so(integrator):
+    """The body that moves fastest was named, which asks for nothing."""
+    with pytest.raises(SolverError, match="would take days; h_max=1e-13 allows no longer ones"):
+        mbsim.simulate(BOUNDED.format(MOVING, "0"), integrator=integrator)
 
 
 def pace_of(steps, end, interval):
