@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from helpers.pairs import frame, turned
 from helpers.surfaces import PLANE, Meshed, box, call, incidents, wrench
-from mbsim.geometry.catalog import COUPLE, GAIN, REGION_ROWS
+from mbsim.geometry.catalog import COUPLE, COUPLE_OF_FORCE, GAIN, REGION_ROWS
 from mbsim.model.flat_parts import fewer_triangles
 
 STILL = frame(np.zeros(3), np.eye(3))
@@ -43,7 +43,8 @@ def measured(pair, frame_i, size_i, frame_j, size_j):
     points = call(pair, frame_i, size_i, frame_j, size_j)
     first, _ = incidents(points)
     found = wrench(points, REGION_ROWS, frame_i[:3])
-    found[3:] += (first[:, :1] * first[:, COUPLE : COUPLE + 3]).sum(axis=0)
+    found[3:] += (0.5 * first[:, :1] ** 2 * first[:, COUPLE : COUPLE + 3]).sum(axis=0)
+    found[3:] += (first[:, :1] * first[:, COUPLE_OF_FORCE : COUPLE_OF_FORCE + 3]).sum(axis=0)
     return 0.5 * (first[:, 7] * first[:, 0] ** 2).sum(), found
 
 
