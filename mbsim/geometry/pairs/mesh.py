@@ -17,11 +17,9 @@ from mbsim.geometry.catalog import (
     AT_NORMAL,
     AT_WEIGHT,
     COUPLE,
-    COUPLE_OF_FORCE,
     axis,
     pair,
     put_couple,
-    put_couple_of_force,
     put_point,
     region,
 )
@@ -52,21 +50,20 @@ from mbsim.model.hull import (
 
 
 @jitable
-def _weights_of_patches(hull: F1, local: V3, points: F2) -> tuple[float, V3]:
+def _weights_of_patches(hull: F1, local: V3, points: F2) -> None:
     """Fill the weights of the patches of a fine mesh over a plane of normal `local`.
 
     The corners of a side that lies share 4 among them, as those of a box do; as far as none
-    lies, the deepest corner has a weight of 1. Facets of a round surface are no sides.
-    Returns how far a side lies, 0 to 1, and how that changes as the mesh turns. Of rows with
-    corners of such a side the normal is the mean of these, and the first number of the couple of
-    the force 1; of others that is 0. The couples of energy are filled in the mesh's axes.
+    lies, the deepest corner has a weight of 1, in the last row. Facets of a round surface are no
+    sides. The normals are the mean of a row's corners of such sides. The couples are those of
+    energy in the mesh's axes.
     """
     rows, deepest, flat, total = int(hull[ROWS]), 0, 0.0, 0.0
-    flatter, more = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    flatter, more, last_row = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), int(hull[ROWS]) - 1
     planes, starts = int(hull[AT_PLANES]), int(hull[AT_STARTS])
     loops, data, corners = int(hull[AT_LOOPS]), int(hull[AT_DATA]), int(hull[AT_CORNERS])
     for row in range(rows):
-        points[row, AT_WEIGHT] = points[row, COUPLE_OF_FORCE] = 0.0
+        points[row, AT_WEIGHT] = 0.0
         for c in range(3):
             points[row, AT_NORMAL + c] = points[row, COUPLE + c] = 0.0
         if points[row, AT_DEPTH] > points[deepest, AT_DEPTH]:
@@ -91,16 +88,15 @@ def _weights_of_patches(hull: F1, local: V3, points: F2) -> tuple[float, V3]:
     for row in range(rows):
         weight = points[row, AT_WEIGHT]
         if weight > 0.0:
-            points[row, COUPLE_OF_FORCE] = 1.0
             for c in range(3):
                 points[row, AT_NORMAL + c] /= weight
                 change = (flatter[c] - flat / total * more[c]) * weight / total
                 points[row, COUPLE + c] = flat / total * points[row, COUPLE + c] - change
             points[row, AT_WEIGHT] *= flat / total
-    points[deepest, AT_WEIGHT] += 1.0 - flat
+    points[last_row, AT_DEPTH], points[last_row, 1] = points[deepest, AT_DEPTH], points[deepest, 1]
+    points[last_row, AT_WEIGHT] = 1.0 - flat
     for c in range(3):
-        points[deepest, COUPLE + c] += flatter[c]
-    return flat, flatter
+        points[last_row, COUPLE + c] = flatter[c]
 
 
 @pair("MESH", "PLANE", slots=MOST_ROWS)
@@ -126,26 +122,23 @@ def mesh_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> 
         if depth > points[row, AT_DEPTH]:
             # remember which corner; its place follows once
             points[row, AT_DEPTH], points[row, 1] = depth, k
-    flat, flatter = 0.0, (0.0, 0.0, 0.0)
-    if int(hull[CORNERS]) > rows:
-        flat, flatter = _weights_of_patches(hull, local, points)
+    fine = int(hull[CORNERS]) > rows
+    if fine:
+        _weights_of_patches(hull, local, points)
     else:
         for row in range(rows):
             points[row, AT_WEIGHT] = hull[weights + row]
     for row in range(rows):
         depth, p = points[row, AT_DEPTH], vector(hull, corners + 3 * int(points[row, 1]))
-        couple, of_force, weight = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), points[row, AT_WEIGHT]
-        if flat > 0.0:
+        couple, weight = (0.0, 0.0, 0.0), points[row, AT_WEIGHT]
+        if fine:
             couple = to_global(frame_i, vector(points[row, COUPLE:]))
-            if points[row, COUPLE_OF_FORCE] > 0.0:
-                middle = sub(vector(points[row, AT_NORMAL:]), p)
-                of_force = to_global(frame_i, scale(weight * dot(middle, local), flatter))
-                p = add(p, scale(flat, middle))
+            if row < rows - 1 and weight > 0.0:
+                p = vector(points[row, AT_NORMAL:])
                 depth = -height - dot(p, local)
         p = add(vector(frame_i), to_global(frame_i, p))
         put_point(points[row], depth, add(p, scale(0.5 * depth, n)), n, weight)
         put_couple(points[row], couple)
-        put_couple_of_force(points[row], of_force)
         if points[row, AT_WEIGHT] <= LEAST_WEIGHT:
             # a point without force is none
             points[row, AT_DEPTH] = min(depth, 0.0)
