@@ -130,7 +130,8 @@ def write_side(
         peak[k] = 0.0
     for k in range(len(corners)):
         deepest = max(deepest, corners[k, DEPTH])
-    if not deepest > 0.0:
+    # where it has no part this does not change either
+    if not deepest > 0.0 or not lies > 0.0:
         return
     powers, total, p, push = 0.0, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for k in range(len(corners)):
