@@ -97,3 +97,23 @@ def test_dampers_and_friction_only_take_energy(shape, method, tol, friction, tmp
     assert np.diff(energy).max() < max(2.0 * run.audit.balance, 1e-9)
     assert energy[0] - energy[-1] > 0.1 * np.ptp(run["energy/kinetic"])
     assert run.audit.warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("shape", "ground"), [("ring", "plane"), ("ring", "box"), ("cylinder", "plane")]
+)
+def test_which_graphic_is_named_first_has_no_part(shape, ground, tmp_path):
+    # friction is asked at places that are counted from axes of the first one
+    model = deck(shape, 1.5, ground, damping=300.0)
+    turned_round = model.replace(
+        'i_graphics_id="200" j_graphics_id="100"', 'i_graphics_id="100" j_graphics_id="200"'
+    )
+    assert turned_round != model
+    one, other = (
+        run_deck(tmp_path, text, 0.3, integrator="DOPRI5", tol=1e-8)
+        for text in (model, turned_round)
+    )
+    for axis in "xyz":
+        signal = f"bodies/2/position/{axis}"
+        assert other[signal] == pytest.approx(one[signal], abs=1e-7)
+    assert other["energy/kinetic"] == pytest.approx(one["energy/kinetic"], abs=1e-5)
