@@ -84,7 +84,7 @@ def test_a_mesh_on_a_plane(name, limits):
         compare(below(name, at, exponent)[1], right, 3e-6, 1e-6)
 
 
-@pytest.mark.parametrize("limits", BANDS)
+@pytest.mark.parametrize("limits", [*BANDS[:2], (6.0, 8.0)])
 @pytest.mark.parametrize("name", MESHES)
 def test_a_mesh_on_a_mesh(name, limits):
     """Depths are measured along the mean of both normals: off by some of the tilt times depth."""

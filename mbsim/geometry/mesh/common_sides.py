@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from mbsim.core.arrays import F1, F2, I1, V3
-from mbsim.core.blend import step
+from mbsim.core.blend import step, step_derivative
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, any_tangent, cross, dot, norm, scale, sub, vector
 from mbsim.geometry.mesh.merging import PEAK_NUMBERS
@@ -61,6 +61,8 @@ ASLANT = 0.01
 #: other, or edges overlap, they do not.
 REACHED = 0.5
 NARROW, WIDE = 2.0, 6.0
+#: Cosines of the angle of two sides at which their corners begin to hold (12 degrees) and hold (8).
+APART, ALIKE = 0.9781, 0.9903
 
 
 @jitable
@@ -305,7 +307,15 @@ def both_ways(
         how_far(mesh_i, at_i, limits, cosine),
         how_far(mesh_j, at_j, limits, cosine),
     )
-    return of_i * of_j, of_i * by_j + of_j * by_i
+    both, by_both = of_i * of_j, of_i * by_j + of_j * by_i
+    if limits == AT_LEANING:
+        return both, by_both
+    # seen along the mean of normals that differ more, what they have in common is another thing
+    part, by_part = (
+        step(cosine, APART, 0.0, ALIKE, 1.0),
+        step_derivative(cosine, APART, 0.0, ALIKE, 1.0, 1),
+    )
+    return part * both, part * by_both + by_part * both
 
 
 @jitable
