@@ -287,9 +287,9 @@ INC_SLOT, INC_POINT, INC_NORMAL, INC_TANGENT, INC_X, INC_DEPTH = 0, 1, 4, 7, 10,
     INC_GRAPHIC_I,  # of the pair
     INC_GRAPHIC_J,
 ) = range(14, 21)
-#: The couple for a unit of energy (3), and the memory of friction at the begin of the step, as long
-#: as `State.before` is wide.
-INC_COUPLE, INC_MEMORY = 21, 24
+#: The couples for a unit of energy (3) and of force (3), and the memory of friction at the begin of
+#: the step, as long as `State.before` is wide.
+INC_COUPLE, INC_COUPLE_OF_FORCE, INC_MEMORY = 21, 24, 27
 #: Numbers at the end of a row of `Rows.incidents` where pairs are one incident: area, and moments
 #: xx, xy, yy, then the gain of a patch (see geometry.catalog).
 INC_REGION = 5

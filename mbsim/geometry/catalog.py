@@ -11,12 +11,14 @@ arrays:
 * `points` (slots, POINT), written by the pair: depth [L] (> 0 overlap, < 0 the distance of this
   candidate), contact point (midpoint of the two surface points), unit normal from J into I,
   its weight of the law's force (1 unless a manifold splits the force of one corner over
-  several points, so that the sum does not jump when a corner passes over an edge), and the
-  couple on I for a unit of the law's energy where the weight turns with the shapes
-  (`geometry.crossing`), else 0.
+  several points, so that the sum does not jump when a corner passes over an edge), the couple
+  on I for a unit of the law's energy where the weight turns with the shapes
+  (`geometry.crossing`), else 0, and the couple on I for a unit of the law's force where the
+  depth changes otherwise than by what moves at the point, else 0.
 
 The elastic energy of a pair is the sum of weight E(depth) over its points: forces and couples are
-its slopes.
+its slopes. The first couple is -d(weight)/dw, the second one is -weight d(depth)/dw with the point
+held, where w is a small turn of I against J.
 
 It fills every one of its `slots` rows (with meshes: as many as their polyhedra need) and returns
 their number. A slot's identity over time is its row (a corner of a box keeps its row).
@@ -41,10 +43,10 @@ from mbsim.core.rotation import any_tangent, cross, scale
 
 #: Numbers of a shape's size.
 SIZE = 4
-#: Numbers of one candidate: depth, point, normal, weight, couple.
-POINT = 11
+#: Numbers of one candidate: depth, point, normal, weight, couples of energy and of force.
+POINT = 14
 #: Where they begin.
-AT_DEPTH, AT_POINT, AT_NORMAL, AT_WEIGHT, COUPLE = 0, 1, 4, 7, 8
+AT_DEPTH, AT_POINT, AT_NORMAL, AT_WEIGHT, COUPLE, COUPLE_OF_FORCE = 0, 1, 4, 7, 8, 11
 #: Rows before the points of a pair that is one incident (`geometry.region`): the incident, then
 #: numbers of the region in place of a point: its area, and the moments xx, xy, yy [L^2] of the
 #: points' part of the force about the incident, in `plane_axes`.
@@ -167,12 +169,20 @@ def put_point(row: F1, depth: float, p: V3, n: V3, weight: float = 1.0) -> None:
     row[AT_NORMAL], row[AT_NORMAL + 1], row[AT_NORMAL + 2] = n[0], n[1], n[2]
     row[AT_WEIGHT] = weight
     row[COUPLE] = row[COUPLE + 1] = row[COUPLE + 2] = 0.0
+    row[COUPLE_OF_FORCE] = row[COUPLE_OF_FORCE + 1] = row[COUPLE_OF_FORCE + 2] = 0.0
 
 
 @jitable
 def put_couple(row: F1, couple: V3) -> None:
     """Give a candidate the couple on I for a unit of its energy."""
     row[COUPLE], row[COUPLE + 1], row[COUPLE + 2] = couple[0], couple[1], couple[2]
+
+
+@jitable
+def put_couple_of_force(row: F1, couple: V3) -> None:
+    """Give a candidate the couple on I for a unit of its law's force."""
+    for k in range(3):
+        row[COUPLE_OF_FORCE + k] = couple[k]
 
 
 @jitable

@@ -9,12 +9,12 @@ that lies flat (`whole`),
 
 over points with d_i > 0. Its elastic energy is S U(depth), so force and place follow from a
 potential: what a tilt moves the place by, the torque of the points does too. Where weights turn
-with the shapes (`geometry.crossing`), or normals differ, a couple is left, for a unit of the
-law's force. Of a linear law
-force and torque are those of the points in every pose; of others they are where the depth is
-even. Damping has the rate of the place, which tilting hardly moves; what the points' dampers do
-against tilting is a couple (`contact.forces.tilting`) with the moments of their parts of the
-force about the place. From a face over an edge to a corner nothing jumps, for the points do not.
+with the shapes (`geometry.crossing`), depths do, or normals differ, a couple is left, for a unit of
+the law's force. Of a linear law force and torque are those of the points in every pose; of others
+they are where the depth is even. Damping has the rate of the place, which tilting hardly moves;
+what the points' dampers do against tilting is a couple (`contact.forces.tilting`) with the moments
+of their parts of the force about the place. From a face over an edge to a corner nothing jumps, for
+the points do not.
 
 The area is that of the cut of the shape with the plane it touches, or of the common part of two
 faces, as far as they overlap: closed forms.
@@ -36,6 +36,7 @@ from mbsim.geometry.catalog import (
     AT_POINT,
     AT_WEIGHT,
     COUPLE,
+    COUPLE_OF_FORCE,
     MOMENT_XX,
     MOMENT_XY,
     MOMENT_YY,
@@ -43,7 +44,7 @@ from mbsim.geometry.catalog import (
     REGION_ROWS,
     axis,
     plane_axes,
-    put_couple,
+    put_couple_of_force,
     put_point,
 )
 from mbsim.geometry.polygon import TAG, X, Y, clip
@@ -79,7 +80,8 @@ def sum_points(rows: F2, whole: float, area: float) -> None:
             weight += w
             p = add(p, scale(w, vector(rows[k, AT_POINT:])))
             push = add(push, scale(w, vector(rows[k, AT_NORMAL:])))
-            couple = add(couple, scale(0.5 * rows[k, AT_DEPTH] ** 2, vector(rows[k, COUPLE:])))
+            couple = add(couple, scale(0.5 * depth * depth, vector(rows[k, COUPLE:])))
+            couple = add(couple, scale(depth, vector(rows[k, COUPLE_OF_FORCE:])))
     if square <= 0.0:
         for c in range(POINT):
             rows[0, c] = rows[1, c] = rows[deepest, c]
@@ -99,7 +101,7 @@ def sum_points(rows: F2, whole: float, area: float) -> None:
     put_point(rows[0], depth, p, n, force / depth)
     # where weights turn with the shapes, and what the place cannot take
     couple = add(couple, scale(dot(torque, n), n))
-    put_couple(rows[0], scale(1.0 / depth, couple))
+    put_couple_of_force(rows[0], scale(1.0 / depth, couple))
     put_point(rows[1], 0.0, (0.0, 0.0, 0.0), n, 0.0)
     rows[1, AREA] = area
     x, y = plane_axes(n)

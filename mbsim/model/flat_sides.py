@@ -21,19 +21,20 @@ Indices = npt.NDArray[np.int64]
 
 #: Cosines of the tilt at which a side begins to lie (6 degrees) and lies (2).
 LEANS, LIES = 0.9945, 0.9994
-#: Both tilts are at most these parts of the least angle with a neighbour: two do not lie at once.
-#: Beside
-#: neighbours that are nearly in its plane a side lies while it is less deep than some part (`ROOM`
-#: the whole, faded between `SHALLOW` and `DEEP` of it) of its width times that angle: else what
-#: is below has more sides, and is a round surface.
+#: Both tilts are at most these parts of the least angle with a neighbour. Tilted more, a side leans
+#: on its corners, which hold up to such parts of that angle: two sides do not hold at once.
+#: Beside neighbours that are nearly in its plane a side holds while it is less deep than some part
+#: (`ROOM` the whole, faded between `SHALLOW` and `DEEP` of it) of its width times that angle: else
+#: what is below has more sides, and is a round surface.
 LIES_OF, LEANS_OF, SHALLOW, DEEP = 0.25, 0.5, 0.1, 0.5
+HOLDS_OF, LEAVES_OF = 0.4, 0.5
 #: Numbers of a side: how far it is one (0 to 1), its outward normal and height, how many corners
 #: its convex hull has and where they begin, how many edges its border has and where they begin, the
-#: cosines of the tilts at which it begins to lie and lies, its room.
+#: cosines of the tilts at which it begins to lie, lies, begins to hold and holds, its room.
 #: A corner has its place and its share, an edge its two ends with the side to the left.
-SIDE_ROW = 12
+SIDE_ROW = 14
 AS_SIDE, NORMAL, HEIGHT, HULL_COUNT, AT_HULL, BORDER_COUNT, AT_BORDER = 0, 1, 4, 5, 6, 7, 8
-AT_LEANING, AT_LYING, ROOM = 9, 10, 11
+AT_LEANING, AT_LYING, AT_LEAVING, AT_HOLDING, ROOM = 9, 10, 11, 12, 13
 HULL_CORNER, BORDER_EDGE, SHARE = 4, 6, 3
 
 
@@ -79,15 +80,18 @@ def _hull(points: Array, near: float) -> Indices:
     return np.array([*chains[0], *chains[1]], dtype=np.int64)
 
 
-def _limits(bend: float, width: float) -> tuple[float, float, float]:
-    """Return the cosines of the tilts at which a side begins to lie and lies, and its room [L].
+def _limits(bend: float, width: float) -> tuple[float, float, float, float, float]:
+    """Return the cosines of the tilts at which a side begins to lie, lies, begins to hold, holds.
+
+    The last number is its room [L].
 
     `bend` is the least angle with a neighbour [degrees].
     """
     angle = math.radians(bend)
     round_part = 1.0 - step(bend, 10.0, 0.0, 25.0, 1.0)
     room = width * angle / round_part if round_part > 0.0 else math.inf
-    return max(LEANS, math.cos(LEANS_OF * angle)), max(LIES, math.cos(LIES_OF * angle)), room
+    leans, lies = max(LEANS, math.cos(LEANS_OF * angle)), max(LIES, math.cos(LIES_OF * angle))
+    return leans, lies, math.cos(LEAVES_OF * angle), math.cos(HOLDS_OF * angle), room
 
 
 def sides_of(vertices: Array, faces: Faces, beside: Indices) -> tuple[Indices, Array]:

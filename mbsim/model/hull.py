@@ -20,7 +20,8 @@ from mbsim.model.mesh import Faces, solid_fault
 FLATNESS = 1e-6
 #: Larger meshes are not looked at; the closed forms would not pay.
 MOST_FACES = 5000
-#: Contact points of a polyhedron on a plane; with more corners, one a patch of corners.
+#: Contact points of a polyhedron on a plane; with more corners, one a patch of corners and the last
+#: one for the deepest corner.
 MOST_ROWS = 64
 
 #: Numbers of the header: corners, faces, edges, colours, rows, most corners of a face, then
@@ -122,13 +123,16 @@ def _colours(count: int, loops: list[list[int]], corners: Array) -> list[int]:
 
 
 def _patches(corners: Array) -> Array:
-    """Return the row of every corner: its own, or of the nearest of MOST_ROWS spread corners."""
+    """Return the row of every corner: its own, or of the nearest of some spread corners.
+
+    Then the last one of MOST_ROWS is left for the deepest corner.
+    """
     if len(corners) <= MOST_ROWS:
         return np.arange(len(corners), dtype=np.float64)
     away = np.full(len(corners), math.inf)
     row = np.zeros(len(corners))
     seed = 0
-    for k in range(MOST_ROWS):
+    for k in range(MOST_ROWS - 1):
         distance = np.linalg.norm(corners - corners[seed], axis=1)
         row[distance < away] = k
         away = np.minimum(away, distance)
@@ -207,7 +211,7 @@ def _pack(corners: Array, loops: list[list[int]], beyond: dict[tuple[int, int], 
     weight = np.array([total / count / (0.5 * math.pi) for total, count in angles])
     colour = _colours(len(corners), loops, corners)
     row = _patches(corners)
-    rows = int(row.max()) + 1
+    rows = min(len(corners), MOST_ROWS)
     edges = [[a, b, f, beyond[b, a]] for (a, b), f in beyond.items() if a < b]
     table = [
         [corner, beyond[loop[(k + 1) % len(loop)], corner]]
@@ -227,7 +231,7 @@ def _pack(corners: Array, loops: list[list[int]], beyond: dict[tuple[int, int], 
         np.array(table),
         np.array(edges),
         np.column_stack([weight, colour, row]),
-        np.array([weight[row == k].mean() for k in range(rows)]),
+        np.array([weight[row == k].mean() if (row == k).any() else 1.0 for k in range(rows)]),
         np.array(sides),
     ]
     head = [len(corners), len(loops), len(edges), max(colour) + 1, rows, max(map(len, loops))]

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
 
 import mbsim
 from helpers.decks import write_deck
@@ -19,6 +21,8 @@ from helpers.folders import MODELS
 from helpers.free_bodies import Silent
 from helpers.mechanics import Body
 from helpers.mechanism_decks import SIDE, SKEW, Joint, Scene, marker, rotation
+from helpers.pairs import turned
+from helpers.surfaces import mesh_graphic
 from mbsim.arrays.hooks import Joints
 from mbsim.compile_model import tangent
 from mbsim.compile_model.build import build
@@ -758,6 +762,44 @@ def test_x_and_memory_of_friction_are_unknowns(name):
         miss = at.solve_pair(c1, (c1 * dx - df).astype(complex)) - dx
         worst = max(worst, np.abs(miss[at.rows]).max() / abs(c1))
     assert worst < 1e-6
+
+
+def leaning(shape, degrees, friction):
+    """Return a mesh that is tilted and 0.2 mm below the ground at its lowest corner."""
+    if shape == "ring":
+        solid = trimesh.creation.annulus(0.05, 0.1, 0.1, sections=24)
+    else:
+        solid = trimesh.creation.cylinder(0.1, 0.1, sections=96)
+    R = turned((1.0, 0.3, 0.0), np.radians(degrees))
+    first, second, third = (float(x) for x in Rotation.from_matrix(R).as_euler("ZXZ"))
+    high = -2e-4 - float((solid.vertices @ R.T)[:, 2].min())
+    return f"""
+<Body_Rigid id="1" isground="TRUE"/><Reference_Marker id="10" body_id="1"/>
+<Post_Graphic id="100" type="Plane" rm_id="10"/>
+<Body_Rigid id="2" cg_id="20" mass="1" inertia_xx="4e-3" inertia_yy="4e-3" inertia_zz="2e-3"/>
+<Reference_Marker id="20" body_id="2" pos_z="{high!r}" psi="{first!r}" theta="{second!r}"
+ phi="{third!r}"/>{mesh_graphic(200, 20, solid.vertices, solid.faces)}
+<Force_Contact id="301" i_graphics_id="200" j_graphics_id="100" cnf_type="IMPACT" stiffness="1e6"
+ exponent="1.5" damping="0" dmax="1e-5" {friction}/>"""
+
+
+@pytest.mark.parametrize("friction", ["", 'cff_type="TANH" mu_dynamic="0.3"'])
+@pytest.mark.parametrize("degrees", [4.0, 5.0, 8.0, 20.0])
+@pytest.mark.parametrize("shape", ["ring", "cylinder"])
+def test_a_flat_side_that_leans(shape, degrees, friction, tmp_path):
+    """Slopes of the couples that change with the tilt; how corners turn with the body is missed."""
+    extra = f'{friction} friction_trans_vel="1e-3"' if friction else ""
+    it = Linearised(write_deck(tmp_path, leaning(shape, degrees, extra)))
+    y = it.y.copy()
+    y[7:13] += [1e-3, 2e-3, -1e-3, 0.01, 0.02, 0.03]
+    changes = list(it.changes(y, 0.0, eps=1e-8))
+    it.linearise(y, 0.0)
+    for c1, bound in ((1e2, 0.025), (1e3, 4e-4)):
+        it.factor(c1)
+        for dx, df in changes:
+            miss = it.solve(c1 * dx - df) - dx
+            miss[7:13] /= c1
+            assert np.abs(miss[it.rows]).max() < bound
 
 
 @pytest.mark.parametrize("friction", ["", 'cff_type="TANH" mu_dynamic="0.3"'])

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from scipy.spatial.transform import Rotation
 
+from helpers import virtual_work
 from helpers.pairs import frame, turned
 from helpers.surfaces import PLANE, Meshed, box, call, incidents, wrench
-from mbsim.geometry.catalog import COUPLE, GAIN, REGION_ROWS
+from mbsim.geometry.catalog import GAIN, REGION_ROWS
 from mbsim.model.flat_parts import fewer_triangles
 
 STILL = frame(np.zeros(3), np.eye(3))
@@ -41,30 +41,15 @@ MESHES = {
 def measured(pair, frame_i, size_i, frame_j, size_j):
     """Return energy and wrench on I about its origin for springs of stiffness 1."""
     points = call(pair, frame_i, size_i, frame_j, size_j)
-    first, _ = incidents(points)
-    found = wrench(points, REGION_ROWS, frame_i[:3])
-    found[3:] += (first[:, :1] * first[:, COUPLE : COUPLE + 3]).sum(axis=0)
-    return 0.5 * (first[:, 7] * first[:, 0] ** 2).sum(), found
+    return virtual_work.measured(points, True, frame_i[:3])
 
 
 def slope(pair, frame_i, size_i, frame_j, size_j):
     """Return the wrench that the energy's differences give."""
-    found = np.zeros(6)
-    for k in range(6):
-        h, ends = (1e-8 if k < 3 else 1e-7), []
-        for sign in (1.0, -1.0):
-            moved = frame_i.copy()
-            if k < 3:
-                moved[k] += sign * h
-            else:
-                turn = Rotation.from_rotvec(sign * h * np.eye(3)[k - 3]).as_matrix()
-                moved[3:] = (turn @ frame_i[3:].reshape(3, 3)).ravel()
-            ends.append(measured(pair, moved, size_i, frame_j, size_j)[0])
-        found[k] = (ends[1] - ends[0]) / (2.0 * h)
-    return found
+    return virtual_work.slope(lambda at: measured(pair, at, size_i, frame_j, size_j)[0], frame_i)
 
 
-@pytest.mark.parametrize("tilt", [0.0, 3e-4, 1e-3, 5e-3, 0.03])
+@pytest.mark.parametrize("tilt", [0.0, 3e-4, 1e-3, 5e-3, 0.03, 0.06, 0.09, 0.2, 0.6])
 @pytest.mark.parametrize("name", ["ring", "angle", "slab"])
 def test_on_a_plane_the_force_is_the_slope_of_the_energy(name, tilt):
     mesh, R = MESHES[name], turned((1.0, 0.3, 0.0), tilt)

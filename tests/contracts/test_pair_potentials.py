@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 
 from helpers.pairs import SIZES, candidates, frame, random_rotation, turned
 from helpers.polyhedra import PLANE, Shape, box, box_mesh, mesh, points_of
-from mbsim.geometry.catalog import COUPLE, PAIRS
+from mbsim.geometry.catalog import COUPLE, COUPLE_OF_FORCE, PAIRS, POINT
 
 #: Step of the differences, as a length and an angle; their error is some 1e-16 / STEP + STEP^2.
 STEP = 1e-6
@@ -42,7 +42,9 @@ def felt(rows, about):
     """Return force and torque on I of springs of stiffness 1, with couples."""
     down = rows[rows[:, 0] > 0.0]
     force = (down[:, 7] * down[:, 0])[:, None] * down[:, 4:7]
-    torque = np.cross(down[:, 1:4] - about, force) + 0.5 * down[:, :1] ** 2 * down[:, COUPLE:]
+    torque = np.cross(down[:, 1:4] - about, force)
+    torque += 0.5 * down[:, :1] ** 2 * down[:, COUPLE : COUPLE + 3]
+    torque += down[:, :1] * down[:, COUPLE_OF_FORCE : COUPLE_OF_FORCE + 3]
     return np.concatenate([force.sum(axis=0), torque.sum(axis=0)])
 
 
@@ -190,7 +192,7 @@ def rotor_on_hull(shape, swapped, rng):
     def rows_of(frame_i, frame_j):
         sides = [(f[:3], f[3:].reshape(3, 3)) for f in (frame_i, frame_j)]
         rows = asked.rows(*sides)
-        return rows if len(rows) else np.zeros((1, 11))
+        return rows if len(rows) else np.zeros((1, POINT))
 
     return rows_of
 

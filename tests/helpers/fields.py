@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 
+from mbsim.geometry.catalog import COUPLE_OF_FORCE
 from mbsim.model.surface import pack
 from mbsim.model.surface_layer import layer, tetrahedra
 
@@ -147,6 +148,7 @@ def wrench(points, about):
         if row[0] > 0.0:
             own = row[7] * row[0] * row[4:7]
             force += own
-            torque += np.cross(row[1:4] - about, own) + row[0] * row[8:11]
+            of_force = row[COUPLE_OF_FORCE : COUPLE_OF_FORCE + 3]
+            torque += np.cross(row[1:4] - about, own) + row[0] * of_force
             energy += 0.5 * row[7] * row[0] ** 2
     return force, torque, energy

@@ -702,8 +702,9 @@ def test_mixed_pile_comes_to_rest():
         place, speed = results[f"bodies/{body}/position"], results[f"bodies/{body}/velocity"]
         assert np.abs(place[:, :2]).max() < 45.0
         assert place[-1, 2] > 4.9
-        # what touches in one point or on one line may roll and spin on, as fast as it was left
-        assert np.linalg.norm(speed[late], axis=1).max() < (20.0 if body in (5, 7) else 0.01)
+        # what touches in one point or on one line may roll and spin on, as fast as it was left;
+        # what leans on others creeps, as friction that is smoothed over 20 mm/s lets it
+        assert np.linalg.norm(speed[late], axis=1).max() < (20.0 if body in (5, 7) else 0.4)
     assert abs(results.audit.balance) < 0.02 * results.audit.of
 
 

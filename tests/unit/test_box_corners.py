@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mbsim.geometry.catalog import AT_DEPTH, AT_WEIGHT, COUPLE
+from mbsim.geometry.catalog import AT_DEPTH, AT_WEIGHT, POINT
 from mbsim.geometry.pairs.box_box import BOX_BOX_SLOTS, TIE, box_box
 
 
@@ -22,7 +22,7 @@ def test_weights_of_corners_near_edges_add_up_to_four():
     for _ in range(400):
         place = [tie * random.uniform(-3.0, 3.0), 1e-6 * random.normal(), 0.2 - 1e-4]
         turns = [1e-5 * random.normal(), 0.0, 20.0 * tie * random.normal()]
-        points = np.zeros((BOX_BOX_SLOTS, COUPLE + 3))
+        points = np.zeros((BOX_BOX_SLOTS, POINT))
         box_box(frame(place, turns), half, frame(np.zeros(3), np.zeros(3)), half, points)
         touching = points[points[:, AT_DEPTH] > 0.0]
         assert abs(touching[:, AT_WEIGHT].sum() - 4.0) < 1e-5, (place, turns)

@@ -27,6 +27,7 @@ from mbsim.geometry.catalog import (
     AT_NORMAL,
     AT_POINT,
     COUPLE,
+    COUPLE_OF_FORCE,
     LEAN_X,
     LEAN_Y,
     REGION_ROWS,
@@ -74,6 +75,7 @@ def measure_pair(scene: Scene, pair: int) -> bool:
             for k in range(3):
                 work.points[s, AT_NORMAL + k] = -work.points[s, AT_NORMAL + k]
                 work.points[s, COUPLE + k] = -work.points[s, COUPLE + k]
+                work.points[s, COUPLE_OF_FORCE + k] = -work.points[s, COUPLE_OF_FORCE + k]
     keep_places(scene, pair)
     return True
 

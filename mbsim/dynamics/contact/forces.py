@@ -45,6 +45,7 @@ from mbsim.geometry.catalog import (
     AT_POINT,
     AT_WEIGHT,
     COUPLE,
+    COUPLE_OF_FORCE,
     GAIN,
     REGION_ROWS,
 )
@@ -340,8 +341,9 @@ def add_contact(scene: Scene, t: float, h: float, y: F1, dy: F1, s: int) -> int:
     weight = point[AT_WEIGHT]
     stored, lost = weight * out[ENERGY], weight * (out[LOAD] - out[ELASTIC]) * rate
     normal, elastic = weight * gain * out[LOAD], weight * gain * out[ELASTIC]
-    # of weights that turn with the shapes
-    couple = scale(out[ELASTIC] if whole > 0.0 else out[ENERGY], vector(point[COUPLE:]))
+    # of weights that turn with the shapes, and of depths that do
+    couple = scale(out[ENERGY], vector(point[COUPLE:]))
+    couple = add(couple, scale(out[ELASTIC], vector(point[COUPLE_OF_FORCE:])))
     row[FRICTION_STORED] = row[MODE] = row[BRANCH] = 0.0
     if contacts.memory[c] > 0:
         # of a power law F = k d^e, whose energy is F d / (e + 1)

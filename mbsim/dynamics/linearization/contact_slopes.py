@@ -38,6 +38,8 @@ from mbsim.geometry.catalog import (
     AT_NORMAL,
     AT_POINT,
     AT_WEIGHT,
+    COUPLE,
+    COUPLE_OF_FORCE,
     LEAN_X,
     LEAN_Y,
     MOMENT_XX,
@@ -286,6 +288,42 @@ def add_moves_of_centre(scene: Scene, T: Tangent, y: F1, s: int, by_rate: float)
 
 
 @jitable
+def has_couples(scene: Scene, s: int) -> bool:
+    """Return whether the weight or the depth of slot s turns with the shapes."""
+    point = scene.work.points[s]
+    for k in range(3):
+        if point[COUPLE + k] != 0.0 or point[COUPLE_OF_FORCE + k] != 0.0:
+            return True
+    return False
+
+
+@jitable
+def add_couples(scene: Scene, T: Tangent, y: F1, s: int, by_depth: float) -> None:
+    """Add how the normal force and the couples of slot s change with depth and weight.
+
+    With the energy w U(d) of `geometry.catalog` and the couples C of energy and B of force the
+    displacements u along the depth and C about the weight give the second derivative
+    w F' u u' + F (u C' + C u'), u = n + B / w; w itself turns about C once more, which is little
+    beside F' where a contact is less deep than its levers are long. `by_depth` is w F'. How the
+    force changes with displacements is left in row PRESS of `basis`.
+    """
+    P, L, point, nb = T.pattern, T.linear, scene.work.points[s], len(scene.bodies.mass)
+    i, j = contact_bodies(scene, s)
+    p, n, none = vector(point[AT_POINT:]), vector(point[AT_NORMAL:]), (0.0, 0.0, 0.0)
+    force, gain = scene.work.slot[s, NORMAL] / point[AT_WEIGHT], gain_of(scene, s)
+    turned = scale(1.0 / (point[AT_WEIGHT] * gain), vector(point[COUPLE_OF_FORCE:]))
+    about, deeper, press = L.basis[:, POINT], L.basis[:, MOVED], L.basis[:, PRESS]
+    for side in range(2):
+        b = i if side == 0 else j
+        lever(scene, L, y, b, p, none, vector(point[COUPLE:]), about[side])
+        lever(scene, L, y, b, p, n, turned, deeper[side])
+        for c in range(6):
+            press[side, c] = by_depth * deeper[side, c] + force * about[side, c]
+    add_two_sided(P, L.K, nb, i, j, -1.0, deeper, press)
+    add_two_sided(P, L.K, nb, i, j, -force, about, deeper)
+
+
+@jitable
 def normal_slopes(
     scene: Scene, s: int, c: int, depth: float, rate: float
 ) -> tuple[int, float, float]:
@@ -346,7 +384,10 @@ def add_contact_slopes(  # noqa: C901
     for side in range(2):
         lever(scene, L, y, i if side == 0 else j, p, n, none, normal[side, ALONG_N])
     u, v = normal[:, ALONG_N], normal[:, ALONG_N]
-    if not region:
+    coupled = not region and has_couples(scene, s)
+    if coupled:
+        add_couples(scene, T, y, s, by_depth)
+    elif not region:
         add_two_sided(P, L.K, nb, i, j, -by_depth, u, v)
     add_two_sided(P, L.D, nb, i, j, -by_rate, u, v)
     if contacts.friction_law[c] == 0:
@@ -396,7 +437,7 @@ def add_contact_slopes(  # noqa: C901
                 add_two_sided(P, L.D, nb, i, j, L.law[r, column], u, L.basis[:, ALONG_X + column])
         by_normal = L.law[r, PRESSED]
         if by_normal != 0.0:
-            if region:
+            if region or coupled:
                 add_two_sided(P, L.K, nb, i, j, -by_normal, u, L.basis[:, PRESS])
             else:
                 add_two_sided(P, L.K, nb, i, j, -by_normal * by_depth, u, L.basis[:, ALONG_N])

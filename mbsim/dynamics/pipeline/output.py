@@ -10,6 +10,7 @@ from mbsim.arrays.codes import (
     DISSIPATED,
     DRIFT,
     INC_COUPLE,
+    INC_COUPLE_OF_FORCE,
     INC_DEPTH,
     INC_FROZEN,
     INC_GRAPHIC_I,
@@ -79,6 +80,7 @@ from mbsim.geometry.catalog import (
     AT_POINT,
     AT_WEIGHT,
     COUPLE,
+    COUPLE_OF_FORCE,
     GAIN,
     MOMENT_XX,
     MOMENT_XY,
@@ -178,6 +180,7 @@ def fill_incidents(scene: Scene, h: float, y: F1) -> int:
             row[INC_POINT + j] = work.points[s, AT_POINT + j]
             row[INC_NORMAL + j] = work.points[s, AT_NORMAL + j]
             row[INC_COUPLE + j] = work.points[s, COUPLE + j]
+            row[INC_COUPLE_OF_FORCE + j] = work.points[s, COUPLE_OF_FORCE + j]
             row[INC_TANGENT + j] = work.t[s, j]
             row[INC_X + j] = y[at + j] if at >= 0 else 0.0
         row[INC_DEPTH] = work.slot[s, DEPTH]

@@ -10,6 +10,7 @@ from __future__ import annotations
 from mbsim.arrays.codes import (
     CONTACT_COLUMNS,
     INC_COUPLE,
+    INC_COUPLE_OF_FORCE,
     INC_DEPTH,
     INC_FROZEN,
     INC_GRAPHIC_I,
@@ -42,6 +43,7 @@ from mbsim.geometry.catalog import (
     AT_DEPTH,
     AT_WEIGHT,
     COUPLE,
+    COUPLE_OF_FORCE,
     GAIN,
     MOMENT_XX,
     MOMENT_XY,
@@ -63,6 +65,7 @@ def put_back(scene: Scene, row: F1) -> int:
     for k in range(3):
         point[1 + k], point[4 + k] = row[INC_POINT + k], row[INC_NORMAL + k]
         point[COUPLE + k] = row[INC_COUPLE + k]
+        point[COUPLE_OF_FORCE + k] = row[INC_COUPLE_OF_FORCE + k]
         state.t[s, k] = row[INC_TANGENT + k]
     if scene.kinds.whole[pairs.kind[pair]] > 0.0:
         numbers, at = work.points[s + 1], len(row) - INC_REGION

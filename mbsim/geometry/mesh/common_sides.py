@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from mbsim.core.arrays import F1, F2, I1, V3
-from mbsim.core.blend import step
+from mbsim.core.blend import step, step_derivative
 from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, any_tangent, cross, dot, norm, scale, sub, vector
 from mbsim.geometry.mesh.merging import PEAK_NUMBERS
@@ -24,18 +24,27 @@ from mbsim.geometry.mesh.sides import (
     ASIDE,
     CORNER,
     DEPTH,
+    LEANING,
+    LYING,
     PART,
     WHERE,
-    how_far_it_lies,
+    how_far,
     lean_of,
-    lies_more,
     no_sides,
     shallow,
     side_at,
     side_of,
     write_side,
 )
-from mbsim.model.flat_sides import AT_BORDER, BORDER_COUNT, BORDER_EDGE, HEIGHT, NORMAL
+from mbsim.model.flat_sides import (
+    AT_BORDER,
+    AT_LEANING,
+    AT_LEAVING,
+    BORDER_COUNT,
+    BORDER_EDGE,
+    HEIGHT,
+    NORMAL,
+)
 from mbsim.model.surface import AT_SIDES, SIDES
 
 #: Columns of a corner of what two sides have in common: place in J's side, the edges of I and of J
@@ -52,6 +61,8 @@ ASLANT = 0.01
 #: other, or edges overlap, they do not.
 REACHED = 0.5
 NARROW, WIDE = 2.0, 6.0
+#: Cosines of the angle of two sides at which their corners begin to hold (12 degrees) and hold (8).
+APART, ALIKE = 0.9781, 0.9903
 
 
 @jitable
@@ -232,9 +243,9 @@ def exterior_shares(found: F2, corners: F2) -> float:
 
 @jitable
 def lay_on_side(
-    mesh_i: F1, side_i: int, mesh_j: F1, side_j: int, pose: F1, origin: V3, pieces: F1, peak: F1
+    mesh_i: F1, side_i: int, mesh_j: F1, side_j: int, pose: F1, origin: V3, pieces: F1, peaks: F2
 ) -> None:
-    """Write what two sides that lie on each other do as a peak, in J's axes from `origin`.
+    """Write what two sides do that lie or lean on each other, in J's axes from `origin`.
 
     Both are seen along the mean n of their normals.
     """
@@ -270,39 +281,65 @@ def lay_on_side(
         p = add(p, scale(0.5 * (above + below), n))
         for c in range(3):
             corners[k, WHERE + c], corners[k, ALONG + c] = p[c], g[c]
-    push_aside(found, corners, edges_i, edges_j, x, y)
     part = 0.0
     if deepest > 0.0:
         part = step(pieces[PEAK], 0.0, 0.0, REACHED * deepest, 1.0)
         part *= step(wide, NARROW * deepest, 0.0, WIDE * deepest, 1.0)
         part *= shallow(mesh_i, at_i, deepest) * shallow(mesh_j, at_j, deepest)
-    cosine = -dot(n_i, n_j)
-    of_i, of_j = how_far_it_lies(mesh_i, at_i, cosine), how_far_it_lies(mesh_j, at_j, cosine)
-    more = of_i * lies_more(mesh_j, at_j, cosine) + of_j * lies_more(mesh_i, at_i, cosine)
-    turns = scale(-part * more, cross(n_i, n_j))
+    cosine, steeper = -dot(n_i, n_j), scale(-part, cross(n_i, n_j))
     lean = sub(lean_of(n_i, n), lean_of(n_j, n))
-    write_side(corners, part * of_i * of_j, (lean, turns), pieces, peak)
+    lies, by_lies = both_ways(mesh_i, at_i, mesh_j, at_j, AT_LEANING, cosine)
+    holds, by_holds = both_ways(mesh_i, at_i, mesh_j, at_j, AT_LEAVING, cosine)
+    push_aside(found, corners, edges_i, edges_j, x, y, LYING[0])
+    turns = scale(by_lies, steeper)
+    write_side(corners, part * lies, (lean, turns), LYING, pieces, peaks[0])
+    push_aside(found, corners, edges_i, edges_j, x, y, LEANING[0])
+    turns = scale(by_holds - by_lies, steeper)
+    write_side(corners, part * (holds - lies), (lean, turns), LEANING, pieces, peaks[1])
 
 
 @jitable
-def push_aside(found: F2, corners: F2, edges_i: F2, edges_j: F2, x: V3, y: V3) -> None:
+def both_ways(
+    mesh_i: F1, at_i: int, mesh_j: F1, at_j: int, limits: int, cosine: float
+) -> tuple[float, float]:
+    """Return how far two sides are within their limits, see `sides.how_far`, and its slope."""
+    (of_i, by_i), (of_j, by_j) = (
+        how_far(mesh_i, at_i, limits, cosine),
+        how_far(mesh_j, at_j, limits, cosine),
+    )
+    both, by_both = of_i * of_j, of_i * by_j + of_j * by_i
+    if limits == AT_LEANING:
+        return both, by_both
+    # seen along the mean of normals that differ more, what they have in common is another thing
+    part, by_part = (
+        step(cosine, APART, 0.0, ALIKE, 1.0),
+        step_derivative(cosine, APART, 0.0, ALIKE, 1.0, 1),
+    )
+    return part * both, part * by_both + by_part * both
+
+
+@jitable
+def push_aside(found: F2, corners: F2, edges_i: F2, edges_j: F2, x: V3, y: V3, power: int) -> None:
     """Write what corners are pushed by along x, y as shares change where I moves.
 
-    With a_k the direction of the hull's edge from corner k on, sum c_k psi_k^4 is the sum of
-    a_k (psi_k^4 - psi_(k+1)^4) over 2 pi. Corners of I move with it, those of J do not, and where
-    an edge u of I crosses one e of J they move along e.
+    With a_k the direction of the hull's edge from corner k on, sum c_k psi_k^p is the sum of
+    a_k (psi_k^p - psi_(k+1)^p) over 2 pi, p the `power`. Corners of I move with it, those of J do
+    not, and where an edge u of I crosses one e of J they move along e.
     """
-    count = len(corners)
+    count, deepest = len(corners), 0.0
     for k in range(count):
+        deepest = max(deepest, corners[k, DEPTH])
         for c in range(3):
             corners[k, ASIDE + c] = 0.0
-    if count < 3:
+    if count < 3 or not deepest > 0.0:
         return
     for k in range(count):
         after = (k + 1) % count
         ex, ey = found[after, X] - found[k, X], found[after, Y] - found[k, Y]
-        fall = max(0.0, corners[k, DEPTH]) ** 4 - max(0.0, corners[after, DEPTH]) ** 4
-        part = fall / (8.0 * math.pi * (ex * ex + ey * ey))
+        here = max(0.0, corners[k, DEPTH]) / deepest
+        there = max(0.0, corners[after, DEPTH]) / deepest
+        fall = deepest * (here**power - there**power)
+        part = fall / (2.0 * power * math.pi * (ex * ex + ey * ey))
         for end in range(2):
             at, sign = (k, 1.0) if end == 0 else (after, -1.0)
             fx, fy = -sign * part * ey, sign * part * ex
@@ -331,18 +368,17 @@ def normal_of_edges(u: V3, e: V3, n: V3) -> V3:
 
 @jitable
 def facing_sides(mesh_i: F1, side_i: int, mesh_j: F1, side_j: int, pose: F1) -> float:
-    """Return how far two sides lie on each other."""
+    """Return how far corners of two sides that look at each other hold."""
     at_i, at_j = side_at(mesh_i, side_i), side_at(mesh_j, side_j)
     n_j, n_i = vector(mesh_j, at_j + NORMAL), turn(pose, vector(mesh_i, at_i + NORMAL))
-    cosine = -dot(n_i, n_j)
-    return how_far_it_lies(mesh_i, at_i, cosine) * how_far_it_lies(mesh_j, at_j, cosine)
+    return both_ways(mesh_i, at_i, mesh_j, at_j, AT_LEAVING, -dot(n_i, n_j))[0]
 
 
 @jitable
 def sides_between(mesh_i: F1, mesh_j: F1, pose: F1, origin: V3, nodes: F2, pairs: F2, on: I1) -> F2:
-    """Return the pairs of sides that lie on each other as peaks.
+    """Return the pairs of sides that hold each other, each as two peaks: lying and leaning.
 
-    `pairs` are the triangles of the `nodes`; `on` gets the row of each one's sides.
+    `pairs` are the triangles of the `nodes`; `on` gets the number of each one's sides among these.
     """
     on[:] = -1
     if int(mesh_i[SIDES]) == 0 or int(mesh_j[SIDES]) == 0:
@@ -362,11 +398,12 @@ def sides_between(mesh_i: F1, mesh_j: F1, pose: F1, origin: V3, nodes: F2, pairs
         on[k] = at
     if count == 0:
         return no_sides()
-    peaks, pieces = np.zeros((count, PEAK_NUMBERS)), np.zeros((count, PATCH_NUMBERS))
+    peaks, pieces = np.zeros((2 * count, PEAK_NUMBERS)), np.zeros((count, PATCH_NUMBERS))
     for k in range(len(pairs)):
         if on[k] >= 0:
             add_patch(pieces[on[k]], nodes[k])
     for m in range(count):
         a, b = names[m]
-        lay_on_side(mesh_i, a, mesh_j, b, pose, origin, pieces[m], peaks[m])
+        both = peaks[2 * m : 2 * m + 2]
+        lay_on_side(mesh_i, a, mesh_j, b, pose, origin, pieces[m], both)
     return peaks

@@ -27,7 +27,7 @@ from mbsim.geometry.catalog import (
     REGION_ROWS,
     axis,
     plane_axes,
-    put_couple,
+    put_couple_of_force,
     put_point,
 )
 from mbsim.geometry.mesh.merging import (
@@ -124,7 +124,7 @@ def write_patch(patch: F1, frame: F1, origin: V3, points: F2) -> None:
     n = to_global(frame, local)
     put_point(points[0], depth, add(origin, to_global(frame, c)), n, size / depth)
     rest = sub(vector(patch, TWIST), cross(c, push))
-    put_couple(points[0], scale(1.0 / depth, to_global(frame, rest)))
+    put_couple_of_force(points[0], scale(1.0 / depth, to_global(frame, rest)))
     numbers = points[1]
     for k in range(POINT):
         numbers[k] = -0.0 if k == AT_DEPTH else 0.0

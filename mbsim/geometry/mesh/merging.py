@@ -35,6 +35,7 @@ from mbsim.geometry.catalog import (
     axis,
     plane_axes,
     put_couple,
+    put_couple_of_force,
     put_point,
 )
 from mbsim.geometry.catalog import GAIN as GAIN_OF
@@ -56,8 +57,8 @@ MOST_PEAKS = 8
 #: Numbers of a peak: depth, weight, then point (3), direction (3), area, mean depth and the moments
 #: of the pressure over itself (xx, yy, zz, xy, yz, zx; about the origin of sums); its node; then
 #: what `catalog` has of a lying side (`sides`): gain, stiffness against tilting (6, as moments are,
-#: for a unit of the law's force and of the gain) and lean (3), the couple (3), and how its weight
-#: changes as I turns (3).
+#: for a unit of the law's force and of the gain) and lean (3), the couple for a unit of force (3),
+#: and how its weight changes as I turns (3).
 PEAK_NUMBERS = 33
 PLACE, NORMAL, SURFACE, MEAN, MOMENTS, AT_NODE = 2, 5, 8, 9, 10, 16
 GAIN, STIFF, LEAN, COUPLE, TURNS = 17, 18, 24, 27, 30
@@ -206,7 +207,8 @@ def merge(nodes: F2, links: F2, partners: I2, on: I1, sides: F2, peaks: F2) -> i
 
     What belongs to a peak is added up in its node; links (n, e) [L] and partners (n, e) are the
     largest psi on a shared segment and the node beyond it, -1 for none. `on` says on which of the
-    `sides` that lie a node is, -1 for none: a peak there has what stands out of the side.
+    `sides` that hold a node is, -1 for none: a peak there has what stands out of the side. Each
+    side has two rows.
     """
     count = len(nodes)
     above = np.empty(count, np.int64)
@@ -236,7 +238,7 @@ def merge(nodes: F2, links: F2, partners: I2, on: I1, sides: F2, peaks: F2) -> i
         add_patch(nodes[a], nodes[b])
         join(peaks[found[a]], peaks[found[b]], nodes[a], levels[order[k]])
         if on[b] >= 0:
-            # what stands out of a lying side has the weight of a lower peak that does
+            # what stands out of a side that holds has the weight of a lower peak that does
             part = held[b] * min(1.0, levels[order[k]] / peaks[found[a], 0])
             if part > held[a]:
                 on[a], held[a] = on[b], part
@@ -249,13 +251,13 @@ def merge(nodes: F2, links: F2, partners: I2, on: I1, sides: F2, peaks: F2) -> i
             peaks[t, 1] = 0.0
         node = int(peaks[t, AT_NODE])
         if on[node] >= 0:
-            leave_rest(peaks[t], sides[on[node]], held[node])
+            leave_rest(peaks[t], sides[2 * on[node] : 2 * on[node] + 2], held[node])
     return tops
 
 
 @jitable
 def hold_down(nodes: F2, above: I1, on: I1, held: F1) -> None:
-    """Find for each peak the side that lies there, and how high that is as a part of the peak."""
+    """Find for each peak the side that holds there, and how high that is as a part of the peak."""
     highest = np.zeros(len(above))
     for k in range(len(above)):
         top = root_of(above, k)
@@ -269,15 +271,16 @@ def hold_down(nodes: F2, above: I1, on: I1, held: F1) -> None:
 
 
 @jitable
-def leave_rest(peak: F1, side: F1, part: float) -> None:
-    """Leave a peak what the side that lies there does not have, and what turns it over to that.
+def leave_rest(peak: F1, side: F2, part: float) -> None:
+    """Leave a peak what the side that holds there does not have, and what turns it over to that.
 
-    `part` is how much of the peak is the side's.
+    `part` is how much of the peak is the side's, which has a row as it lies and one as it leans.
     """
-    for c in range(3):
-        peak[COUPLE + c] = 0.5 * part * peak[1] * peak[0] * side[TURNS + c]
-    left = 1.0 - part * side[1]
-    side[SURFACE] += (1.0 - left) * peak[SURFACE]
+    left = 1.0 - part * (side[0, 1] + side[1, 1])
+    for k in range(2):
+        for c in range(3):
+            peak[TURNS + c] -= part * peak[1] * side[k, TURNS + c]
+        side[k, SURFACE] += part * side[k, 1] * peak[SURFACE]
     peak[SURFACE] *= left
     peak[1] *= left
 
@@ -354,6 +357,11 @@ def gather_rest(peaks: F2, count: int, own: int) -> None:
         rest[SURFACE] += part * peaks[k, SURFACE]
         peaks[k, 1] *= 1.0 - part
         peaks[k, SURFACE] *= 1.0 - part
+        for c in range(3):
+            rest[TURNS + c] += part * peaks[k, TURNS + c]
+            rest[COUPLE + c] += part * peaks[k, COUPLE + c]
+            peaks[k, TURNS + c] *= 1.0 - part
+            peaks[k, COUPLE + c] *= 1.0 - part
     for c in range(AT_NODE):
         if c != SURFACE:
             rest[c] /= total
@@ -424,7 +432,8 @@ def write_points(peaks: F2, count: int, frame: F1, origin: V3, points: F2) -> No
         n = to_global(frame, scale(1.0 / norm(n), n))
         p = vector(peak, PLACE)
         put_point(row, peak[0], add(origin, to_global(frame, p)), n, peak[1])
-        put_couple(row, to_global(frame, vector(peak, COUPLE)))
+        put_couple(row, to_global(frame, scale(-1.0, vector(peak, TURNS))))
+        put_couple_of_force(row, to_global(frame, vector(peak, COUPLE)))
         for c in range(POINT):
             numbers[c] = -0.0 if c == AT_DEPTH else 0.0
         numbers[AREA], numbers[GAIN_OF] = peak[SURFACE], peak[GAIN]

@@ -1,4 +1,4 @@
-"""Flat sides of meshes that lie: contact points whose force has a potential.
+"""Flat sides of meshes that lie or lean: contact points whose force has a potential.
 
 The largest depth of a flat side has none that is smooth: it is at one edge, then at another one.
 What holds a rigid body on its side are the corners of the side's convex hull, of two sides those of
@@ -12,8 +12,14 @@ force that of the law; on an edge of a square it is 0.71 of that of the depth th
 0.5. With squares it would be a half and a quarter; with a higher power bodies rock faster. How a
 face is cut into triangles, or its border into edges, has no part in it.
 
-A side lies by how little it is tilted (`model.flat_sides`). As far as it does, peaks of depth on it
-(`merging`) have no force.
+A side lies by how little it is tilted (`model.flat_sides`). From there on it leans: on its corners
+with
+
+    D^16 = 4 sum c_i psi_i^16
+
+which is about the depth of the deepest one: of a square on a corner it is that, on an edge 1.04 of
+it. Where it is tilted more, peaks of depth (`merging`) take over. Each of the three has its part of
+the law's force. Parts change as the body turns, by what each one stores: the couples of energy.
 """
 
 from __future__ import annotations
@@ -48,7 +54,7 @@ from mbsim.model.flat_sides import (
     AS_SIDE,
     AT_HULL,
     AT_LEANING,
-    AT_LYING,
+    AT_LEAVING,
     DEEP,
     HULL_CORNER,
     HULL_COUNT,
@@ -61,9 +67,12 @@ from mbsim.model.flat_sides import NORMAL as SIDE_NORMAL
 from mbsim.model.surface import AT_SIDES, AT_TRIANGLES, SIDE, SIDES, TRIANGLE
 
 #: Columns of a corner of what lies: depth, share, place half way between both surfaces, normal, and
-#: the force along the side where shares change as I moves (for a law's force over D^3).
+#: the force along the side where shares change as I moves (for a law's force, times the power of
+#: depths less 1 of D over the deepest corner).
 CORNER = 11
 DEPTH, PART, WHERE, ALONG, ASIDE = 0, 1, 2, 5, 8
+#: The powers of depths, and the sums of shares, of a side that lies and of one that leans.
+LYING, LEANING = (4, 1.0), (16, 4.0)
 
 
 @jitable
@@ -79,16 +88,15 @@ def side_of(mesh: F1, triangle: int) -> int:
 
 
 @jitable
-def how_far_it_lies(mesh: F1, at: int, cosine: float) -> float:
-    """Return how far a side that is so tilted lies: 1 flat, 0 where it leans."""
-    return mesh[at + AS_SIDE] * step(cosine, mesh[at + AT_LEANING], 0.0, mesh[at + AT_LYING], 1.0)
+def how_far(mesh: F1, at: int, limits: int, cosine: float) -> tuple[float, float]:
+    """Return how far a side that is so tilted is within its limits, and how the cosine changes it.
 
-
-@jitable
-def lies_more(mesh: F1, at: int, cosine: float) -> float:
-    """Return how that changes with the cosine."""
-    low, high = mesh[at + AT_LEANING], mesh[at + AT_LYING]
-    return mesh[at + AS_SIDE] * step_derivative(cosine, low, 0.0, high, 1.0, 1)
+    With `AT_LEANING` how far it lies: 1 flat, 0 where it leans. With `AT_LEAVING` how far its
+    corners hold, as it lies or leans.
+    """
+    low, high, whole = mesh[at + limits], mesh[at + limits + 1], mesh[at + AS_SIDE]
+    slope = whole * step_derivative(cosine, low, 0.0, high, 1.0, 1)
+    return whole * step(cosine, low, 0.0, high, 1.0), slope
 
 
 @jitable
@@ -99,8 +107,10 @@ def shallow(mesh: F1, at: int, deepest: float) -> float:
 
 
 @jitable
-def write_side(corners: F2, lies: float, way: tuple[V3, V3], pieces: F1, peak: F1) -> None:
-    """Write what a lying side does as a peak, which has no weight where no corner is below.
+def write_side(
+    corners: F2, lies: float, way: tuple[V3, V3], of: tuple[int, float], pieces: F1, peak: F1
+) -> None:
+    """Write what a side does as a peak, which has no weight where no corner is below.
 
     Parameters
     ----------
@@ -109,45 +119,53 @@ def write_side(corners: F2, lies: float, way: tuple[V3, V3], pieces: F1, peak: F
         Its part of the law's force.
     way : tuple
         How depth changes along the side, and its part of the force as I turns.
+    of : tuple
+        The power of depths, and the sum of shares.
     pieces : ndarray, shape (PATCH_NUMBERS,)
         What its pieces of surface add up to: how pressure is spread for friction.
     peak : ndarray, shape (PEAK_NUMBERS,)
     """
-    lean, turns = way
+    (lean, turns), (power, shares), deepest = way, of, 0.0
     for k in range(PEAK_NUMBERS):
         peak[k] = 0.0
-    fourth, total, p, push = 0.0, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for k in range(len(corners)):
-        depth = corners[k, DEPTH]
-        if depth > 0.0:
-            pressing = corners[k, PART] * depth**3
-            fourth, total = fourth + pressing * depth, total + pressing
+        deepest = max(deepest, corners[k, DEPTH])
+    # where it has no part this does not change either
+    if not deepest > 0.0 or not lies > 0.0:
+        return
+    powers, total, p, push = 0.0, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for k in range(len(corners)):
+        over = corners[k, DEPTH] / deepest
+        if over > 0.0:
+            pressing = shares * corners[k, PART] * over ** (power - 1)
+            powers, total = powers + pressing * over, total + pressing
             p = add(p, scale(pressing, vector(corners[k, WHERE:])))
             push = add(push, scale(pressing, vector(corners[k, ALONG:])))
-        push = add(push, vector(corners[k, ASIDE:]))
-    if not fourth > 0.0 or not norm(push) > 0.0:
+        push = add(push, scale(shares, vector(corners[k, ASIDE:])))
+    if not norm(push) > 0.0:
         return
-    depth = math.sqrt(math.sqrt(fourth))
-    p, push = scale(1.0 / total, p), scale(1.0 / depth**3, push)
+    # depth over that of the deepest corner
+    part = powers ** (1.0 / power)
+    depth, unit = part * deepest, 1.0 / part ** (power - 1)
+    p, push = scale(1.0 / total, p), scale(unit, push)
     gain, couple, spread = norm(push), (0.0, 0.0, 0.0), 0.0
     for k in range(len(corners)):
         r, over = sub(vector(corners[k, WHERE:]), p), corners[k, DEPTH] / depth
-        couple = add(couple, cross(r, scale(1.0 / depth**3, vector(corners[k, ASIDE:]))))
+        couple = add(couple, cross(r, scale(shares * unit, vector(corners[k, ASIDE:]))))
         if over > 0.0:
-            part = corners[k, PART] * over * over
+            part = shares * corners[k, PART] * over ** (power - 2)
             couple = add(couple, cross(r, scale(part * over, vector(corners[k, ALONG:]))))
             spread += part * over / gain * dot(r, r)
             for c in range(6):
                 a, b = c if c < 3 else c - 3, c if c < 3 else (c - 2 if c < 5 else 0)
-                peak[STIFF + c] += 3.0 * part / (depth * gain) * r[a] * r[b]
+                peak[STIFF + c] += (power - 1) * part / (depth * gain) * r[a] * r[b]
     peak[0], peak[1], peak[GAIN] = depth, lies, gain
     # the depth at the centre is depth / gain
     over = gain / depth
     for k in range(3):
         peak[PLACE + k], peak[NORMAL + k] = p[k], push[k]
         peak[LEAN + k], peak[TURNS + k] = over * lean[k], turns[k]
-        # of a linear law what is stored is half of the force times the depth
-        peak[COUPLE + k] = lies * couple[k] - 0.5 * depth * turns[k]
+        peak[COUPLE + k] = lies * couple[k]
     spread_pieces(pieces, p, spread, peak)
 
 
@@ -186,10 +204,10 @@ def no_sides() -> F2:
 
 @jitable
 def sides_below(mesh: F1, found: I1, n: V3, height: float, origin: V3, nodes: F2, on: I1) -> F2:
-    """Return the sides that lie on the plane x.n = height as peaks.
+    """Return the sides that hold on the plane x.n = height, each as two peaks: lying and leaning.
 
-    `found` are the triangles below it, `nodes` their pieces from `origin`; `on` gets the row of
-    the side of each one, -1 for none.
+    `found` are the triangles below it, `nodes` their pieces from `origin`; `on` gets the number of
+    the side of each one among these, -1 for none.
     """
     on[:] = -1
     if int(mesh[SIDES]) == 0:
@@ -201,28 +219,29 @@ def sides_below(mesh: F1, found: I1, n: V3, height: float, origin: V3, nodes: F2
             continue
         if row[side] == -1:
             at = side_at(mesh, side)
-            lies = how_far_it_lies(mesh, at, -dot(vector(mesh, at + SIDE_NORMAL), n))
-            row[side] = count if lies > 0.0 else -2
-            count += int(lies > 0.0)
+            holds, _ = how_far(mesh, at, AT_LEAVING, -dot(vector(mesh, at + SIDE_NORMAL), n))
+            row[side] = count if holds > 0.0 else -2
+            count += int(holds > 0.0)
     if count == 0:
         return no_sides()
-    peaks, pieces = np.zeros((count, PEAK_NUMBERS)), np.zeros((count, PATCH_NUMBERS))
+    peaks, pieces = np.zeros((2 * count, PEAK_NUMBERS)), np.zeros((count, PATCH_NUMBERS))
     for k in range(len(found)):
         side = side_of(mesh, found[k])
         if side >= 0 and row[side] >= 0:
             on[k] = row[side]
             add_patch(pieces[on[k]], nodes[k])
     for side in range(len(row)):
-        if row[side] >= 0:
-            lay_on_plane(mesh, side, n, height, origin, pieces[row[side]], peaks[row[side]])
+        k = row[side]
+        if k >= 0:
+            lay_on_plane(mesh, side, n, height, origin, pieces[k], peaks[2 * k : 2 * k + 2])
     return peaks
 
 
 @jitable
 def lay_on_plane(
-    mesh: F1, side: int, n: V3, height: float, origin: V3, pieces: F1, peak: F1
+    mesh: F1, side: int, n: V3, height: float, origin: V3, pieces: F1, peaks: F2
 ) -> None:
-    """Write what a side that lies on a plane does as a peak."""
+    """Write what a side does on a plane as it lies and as it leans."""
     at = side_at(mesh, side)
     normal = vector(mesh, at + SIDE_NORMAL)
     first = int(mesh[AT_SIDES]) + int(mesh[at + AT_HULL])
@@ -236,14 +255,18 @@ def lay_on_plane(
         for c in range(3):
             corners[k, WHERE + c], corners[k, ALONG + c], corners[k, ASIDE + c] = p[c], n[c], 0.0
     cosine, part = -dot(normal, n), shallow(mesh, at, deepest)
-    turns = scale(-part * lies_more(mesh, at, cosine), cross(normal, n))
-    lies = part * how_far_it_lies(mesh, at, cosine)
-    write_side(corners, lies, (lean_of(normal, n), turns), pieces, peak)
+    lies = how_far(mesh, at, AT_LEANING, cosine)
+    holds = how_far(mesh, at, AT_LEAVING, cosine)
+    steeper, lean = scale(part, cross(n, normal)), lean_of(normal, n)
+    turns = scale(lies[1], steeper)
+    write_side(corners, part * lies[0], (lean, turns), LYING, pieces, peaks[0])
+    turns = scale(holds[1] - lies[1], steeper)
+    write_side(corners, part * (holds[0] - lies[0]), (lean, turns), LEANING, pieces, peaks[1])
 
 
 @jitable
 def join_sides(peaks: F2, count: int, sides: F2) -> int:
-    """Add the sides that lie to the first `count` peaks; return how many there are then."""
+    """Add the sides that hold to the first `count` peaks; return how many there are then."""
     for k in range(len(sides)):
         if sides[k, 1] > 0.0:
             for c in range(PEAK_NUMBERS):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from mbsim.core.arrays import F1, F2, V3
-from mbsim.core.blend import step
+from mbsim.core.blend import step, step_derivative
 from mbsim.core.jitable import jitable
 from mbsim.core.memory import floats_at
 from mbsim.core.rotation import add, any_tangent, cross, dot, scale, sub, vector
@@ -19,6 +19,7 @@ from mbsim.geometry.catalog import (
     COUPLE,
     axis,
     pair,
+    put_couple,
     put_point,
     region,
 )
@@ -49,28 +50,33 @@ from mbsim.model.hull import (
 
 
 @jitable
-def _weights_of_patches(hull: F1, local: V3, points: F2) -> float:
+def _weights_of_patches(hull: F1, local: V3, points: F2) -> None:
     """Fill the weights of the patches of a fine mesh over a plane of normal `local`.
 
     The corners of a side that lies share 4 among them, as those of a box do; as far as none
-    lies, the deepest corner has a weight of 1. Facets of a round surface are no sides.
-    Returns how far a side lies, 0 to 1. Of rows with corners of such a side the normal is the mean
-    of these, and the first number of the couple 1; of others that is 0.
+    lies, the deepest corner has a weight of 1, in the last row. Facets of a round surface are no
+    sides. The normals are the mean of a row's corners of such sides. The couples are those of
+    energy in the mesh's axes.
     """
     rows, deepest, flat, total = int(hull[ROWS]), 0, 0.0, 0.0
+    flatter, more, last_row = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), int(hull[ROWS]) - 1
     planes, starts = int(hull[AT_PLANES]), int(hull[AT_STARTS])
     loops, data, corners = int(hull[AT_LOOPS]), int(hull[AT_DATA]), int(hull[AT_CORNERS])
     for row in range(rows):
-        points[row, AT_WEIGHT] = points[row, COUPLE] = 0.0
+        points[row, AT_WEIGHT] = 0.0
         for c in range(3):
-            points[row, AT_NORMAL + c] = 0.0
+            points[row, AT_NORMAL + c] = points[row, COUPLE + c] = 0.0
         if points[row, AT_DEPTH] > points[deepest, AT_DEPTH]:
             deepest = row
     for f in range(int(hull[FACES])):
-        lies = step(-dot(vector(hull, planes + 4 * f), local), LEANS, 0.0, LIES, 1.0)
+        side, as_side = vector(hull, planes + 4 * f), hull[int(hull[AT_SIDES]) + f]
+        lies = as_side * step(-dot(side, local), LEANS, 0.0, LIES, 1.0)
         if lies > 0.0:
-            lies *= hull[int(hull[AT_SIDES]) + f]
-            flat, total = max(flat, lies), total + lies
+            slope = as_side * step_derivative(-dot(side, local), LEANS, 0.0, LIES, 1.0, 1)
+            turns = scale(slope, cross(local, side))
+            if lies > flat:
+                flat, flatter = lies, turns
+            total, more = total + lies, add(more, turns)
             first, last = int(hull[starts + f]), int(hull[starts + f + 1])
             for at in range(first, last):
                 corner, weight = int(hull[loops + 2 * at]), 4.0 * lies / (last - first)
@@ -78,14 +84,19 @@ def _weights_of_patches(hull: F1, local: V3, points: F2) -> float:
                 points[row, AT_WEIGHT] += weight
                 for c in range(3):
                     points[row, AT_NORMAL + c] += weight * hull[corners + 3 * corner + c]
+                    points[row, COUPLE + c] -= 4.0 / (last - first) * turns[c]
     for row in range(rows):
-        if points[row, AT_WEIGHT] > 0.0:
-            points[row, COUPLE] = 1.0
+        weight = points[row, AT_WEIGHT]
+        if weight > 0.0:
             for c in range(3):
-                points[row, AT_NORMAL + c] /= points[row, AT_WEIGHT]
+                points[row, AT_NORMAL + c] /= weight
+                change = (flatter[c] - flat / total * more[c]) * weight / total
+                points[row, COUPLE + c] = flat / total * points[row, COUPLE + c] - change
             points[row, AT_WEIGHT] *= flat / total
-    points[deepest, AT_WEIGHT] += 1.0 - flat
-    return flat
+    points[last_row, AT_DEPTH], points[last_row, 1] = points[deepest, AT_DEPTH], points[deepest, 1]
+    points[last_row, AT_WEIGHT] = 1.0 - flat
+    for c in range(3):
+        points[last_row, COUPLE + c] = flatter[c]
 
 
 @pair("MESH", "PLANE", slots=MOST_ROWS)
@@ -111,19 +122,23 @@ def mesh_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) -> 
         if depth > points[row, AT_DEPTH]:
             # remember which corner; its place follows once
             points[row, AT_DEPTH], points[row, 1] = depth, k
-    flat = 0.0
-    if int(hull[CORNERS]) > rows:
-        flat = _weights_of_patches(hull, local, points)
+    fine = int(hull[CORNERS]) > rows
+    if fine:
+        _weights_of_patches(hull, local, points)
     else:
         for row in range(rows):
             points[row, AT_WEIGHT] = hull[weights + row]
     for row in range(rows):
         depth, p = points[row, AT_DEPTH], vector(hull, corners + 3 * int(points[row, 1]))
-        if flat > 0.0 and points[row, COUPLE] > 0.0:
-            p = add(p, scale(flat, sub(vector(points[row, AT_NORMAL:]), p)))
-            depth = -height - dot(p, local)
+        couple, weight = (0.0, 0.0, 0.0), points[row, AT_WEIGHT]
+        if fine:
+            couple = to_global(frame_i, vector(points[row, COUPLE:]))
+            if row < rows - 1 and weight > 0.0:
+                p = vector(points[row, AT_NORMAL:])
+                depth = -height - dot(p, local)
         p = add(vector(frame_i), to_global(frame_i, p))
-        put_point(points[row], depth, add(p, scale(0.5 * depth, n)), n, points[row, AT_WEIGHT])
+        put_point(points[row], depth, add(p, scale(0.5 * depth, n)), n, weight)
+        put_couple(points[row], couple)
         if points[row, AT_WEIGHT] <= LEAST_WEIGHT:
             # a point without force is none
             points[row, AT_DEPTH] = min(depth, 0.0)

@@ -15,11 +15,13 @@ from mbsim.geometry.catalog import (
     AT_POINT,
     AT_WEIGHT,
     COUPLE,
+    COUPLE_OF_FORCE,
     REGION_ROWS,
     axis,
     motion_bound,
     pair,
     put_couple,
+    put_couple_of_force,
     put_point,
 )
 from mbsim.geometry.mesh.ball import (
@@ -116,9 +118,10 @@ def surface_plane(frame_i: F1, size_i: F1, frame_j: F1, size_j: F1, points: F2) 
         # half way between the surface of the mesh and the plane
         p, depth = vector(points[k, AT_POINT:]), points[k, 0]
         p = add(p, scale(-0.5 * depth - dot(sub(p, vector(frame_j)), up), up))
-        couple = vector(points[k, COUPLE:])
+        couple, of_force = vector(points[k, COUPLE:]), vector(points[k, COUPLE_OF_FORCE:])
         put_point(points[k], depth, p, up, points[k, AT_WEIGHT])
         put_couple(points[k], couple)
+        put_couple_of_force(points[k], of_force)
     return len(points)
 
 
