@@ -445,24 +445,3 @@ def take_where_it_meets(
     # its rows are not those of now
     M.measured[pair] = 0
     return room
-
-
-@jitable
-def meets_after_all(scene: Scene, S: Stepping, y: F1, pair: int, h: float) -> bool:
-    """Take the points of a pair that meets by the motion that impulses gave it, if it does.
-
-    Return False if there is no room.
-    """
-    M, room = S.motion, True
-    keep_frames(scene, M, pair)
-    for side in range(2):
-        g = scene.pairs.graphic_i[pair] if side == 0 else scene.pairs.graphic_j[pair]
-        b = scene.graphics.body[g]
-        for c in range(6):
-            M.way[side, c] = M.shift[b, c]
-    measure_pair(scene, pair)
-    t = find_touch(scene, S, y, pair, h, deepest_of(scene, S, pair))
-    if t >= 0.0:
-        room = take_ahead(scene, S, y, pair, t, True)
-    put_back(scene, M, pair)
-    return room

@@ -15,12 +15,10 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import norm, vector
-from mbsim.dynamics.bodies.awake import graphic_awake, graphics_awake
 from mbsim.dynamics.bodies.kinematics import place_graphics
 from mbsim.dynamics.contact.detection import measure_pair
-from mbsim.stepping.ahead import look_ahead_of, meets_after_all, note_pressed, take_where_it_meets
-from mbsim.stepping.arrays import ASLEEP, POINTS, SOME_AHEAD, Stepping
+from mbsim.stepping.ahead import look_ahead_of, note_pressed, take_where_it_meets
+from mbsim.stepping.arrays import ASLEEP, POINTS, Stepping
 from mbsim.stepping.awake import pair_awake, pairs_awake
 from mbsim.stepping.points import deepest_of, fill_reach, take_rows
 from mbsim.stepping.sleep import both_sleep, one_sleeps, wake
@@ -109,58 +107,6 @@ def find_points(scene: Scene, S: Stepping, y: F1, h: float, committed: bool) -> 
     log.counters[NARROWPHASE] += measured
     log.counters[SKIPPED] += pairs_awake(scene, S) - measured
     return 0
-
-
-@jitable
-def fill_went(scene: Scene, S: Stepping, h: float) -> bool:
-    """Bound how far points of graphics go by what impulses gave; True if farther than expected."""
-    graphics, M, farther = scene.graphics, S.motion, False
-    for k in range(graphics_awake(scene)):
-        g = graphic_awake(scene, k)
-        way = M.shift[graphics.body[g]]
-        far, spin = norm(vector(way)), norm((way[3], way[4], way[5]))
-        if spin > 0.0:
-            far += spin * (graphics.radius[g] + norm(vector(graphics.p[g])))
-        M.went[g] = h * far
-        farther = farther or M.went[g] > M.reach[g]
-    return farther
-
-
-@jitable
-def find_missed(scene: Scene, S: Stepping, y: F1, h: float) -> int:
-    """Take points that only the motion behind impulses reaches; return how many, or less a code."""
-    pairs, work, M = scene.pairs, scene.work, S.motion
-    before = S.tally.count[POINTS]
-    farther = fill_went(scene, S, h)
-    if not farther and S.plan.number[SOME_AHEAD] == 0.0:
-        return 0
-    for k in range(pairs_awake(scene, S)):
-        pair = pair_awake(scene, S, k)
-        gi, gj = pairs.graphic_i[pair], pairs.graphic_j[pair]
-        i, j = scene.graphics.body[gi], scene.graphics.body[gj]
-        if both_sleep(S, i, j):
-            continue
-        went = M.went[gi] + M.went[gj]
-        if pairs.left[pair] - work.travel[gi] - work.travel[gj] > went:
-            continue
-        room = True
-        if one_sleeps(S, i, j):
-            if meets_sleeper(scene, S, pair, went, False):
-                wake(scene, S, i if S.rest.body[i, ASLEEP] == 1 else j)
-        elif S.plan.near[pairs.kind[pair]] == 1:
-            reach = M.reach[gi] + M.reach[gj]
-            if went > reach:
-                measure_pair(scene, pair)
-                room = take_rows(scene, S, y, pair, (reach, went))
-        elif M.taken[pair] != M.taken[len(M.taken) - 1]:
-            room = meets_after_all(scene, S, y, pair, h)
-        if not room:
-            return -Code.MANY_POINTS
-    if farther:
-        for k in range(graphics_awake(scene)):
-            g = graphic_awake(scene, k)
-            M.reach[g] = max(M.reach[g], M.went[g])
-    return S.tally.count[POINTS] - before
 
 
 @jitable

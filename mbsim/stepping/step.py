@@ -87,9 +87,10 @@ from mbsim.stepping.impacts import (
 )
 from mbsim.stepping.implicit import is_implicit, take_into_step
 from mbsim.stepping.kept import index_kept, recall
+from mbsim.stepping.missed import find_missed
 from mbsim.stepping.near_pairs import FARTHER, list_anew
 from mbsim.stepping.one_point import apply, fill_drift, velocity_of
-from mbsim.stepping.pairs import find_missed, find_points
+from mbsim.stepping.pairs import find_points
 from mbsim.stepping.points import fill_answers, fill_point, fill_reach, way_at
 from mbsim.stepping.rebound import limit_rebound
 from mbsim.stepping.scales import closer, group_at, left_of, noise_of
