@@ -44,6 +44,8 @@ EASY, EASIER = 1, 1.25
 #: What rounding of positions leaves to velocities, over both and their time: as much as a tenth of
 #: the last digit.
 ROUNDED = 2e-17
+#: What is less than this part of tol is next to nothing of it.
+LITTLE = 0.1
 # what `judge` says
 GO_ON, SOLVED, HOPELESS = range(3)
 #: A step's velocities may be off by this part of its error for what f at its end is not.
@@ -85,8 +87,12 @@ def rounding_of(m: Method, h: float) -> float:
 
 @jitable
 def beyond_rounding(m: Method, h: float, error: float) -> float:
-    """Return the error, over tol, of a step h, if it is too large less what is rounding of it."""
-    return error if error <= 1.0 else max(0.0, error - rounding_of(m, h))
+    """Return the error, over tol, of a step h, if it is too large less what is rounding of it.
+
+    Rounding that is next to nothing of tol changes no step.
+    """
+    rounding = rounding_of(m, h)
+    return error if error <= 1.0 or rounding < LITTLE else max(0.0, error - rounding)
 
 
 @jitable

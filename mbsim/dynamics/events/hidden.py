@@ -32,14 +32,7 @@ from mbsim.dynamics.forces.applied import displacement
 from mbsim.dynamics.stiction.faces import holds_nothing
 from mbsim.laws.catalog import BRANCHES, STICK
 from mbsim.laws.catalog import SLIP as SLIPS
-from mbsim.laws.friction.stiction import (
-    KEPT_LEFT,
-    KEPT_MODE,
-    KEPT_SPEED,
-    KEPT_W,
-    KEPT_Z,
-    MU_STATIC,
-)
+from mbsim.laws.friction.stiction import KEPT_MODE, KEPT_SPEED, KEPT_W, KEPT_Z, MU_STATIC
 
 #: A load that changes by less of itself within a step passes no limit unseen.
 EVEN = 1e-3
@@ -120,26 +113,12 @@ def may_turn(scene: Scene, s: int, h: float) -> bool:
 
 
 @jitable
-def growth_of(kept: F1) -> float:
-    """Return how fast a spring that slips grows by itself, over its length; nan where not known."""
-    left, length = kept[KEPT_LEFT], math.hypot(kept[KEPT_Z], kept[KEPT_Z + 1])
-    if left == 0.0 or length == 0.0:
-        return math.nan
-    along = kept[KEPT_W] * kept[KEPT_Z] + kept[KEPT_W + 1] * kept[KEPT_Z + 1]
-    return (along + left) / length
-
-
-@jitable
 def growths(scene: Scene, s: int) -> tuple[float, float]:
     """Return N'/N in slot s at both ends of the step, which is below 0 no less than so.
 
-    Where it falls the spring's stiffness may fall too. Where the law knows how far it is from
-    sticking, that tells more: a normal force may change with the rate of the depth as well.
+    Where it falls the spring's stiffness may fall too.
     """
     row, state = scene.work.slot[s], scene.state
-    first, last = growth_of(state.memory[s]), growth_of(scene.work.memory[s])
-    if not math.isnan(first + last):
-        return first, last
     steep = row[STIFFNESS] * row[DEPTH] / row[NORMAL]
     grew, grows = state.rate[s] / max(state.depth[s], 1e-300), row[RATE] / row[DEPTH]
     return grew * (steep if grew > 0.0 else 1.0), grows * (steep if grows > 0.0 else 1.0)

@@ -59,7 +59,6 @@ from mbsim.dynamics.bodies.scales import PART, fill_squares
 from mbsim.dynamics.contact.forces import (
     ALONG_X,
     ALONG_Y,
-    BRANCH,
     DEPTH,
     FORCE,
     FRICTION_STORED,
@@ -73,7 +72,6 @@ from mbsim.dynamics.contact.forces import (
     patch,
     sides,
 )
-from mbsim.dynamics.contact.memory import slipping_mass
 from mbsim.geometry.catalog import (
     AREA,
     AT_NORMAL,
@@ -86,7 +84,7 @@ from mbsim.geometry.catalog import (
     MOMENT_XY,
     MOMENT_YY,
 )
-from mbsim.laws.catalog import BRANCHES, LASTS, STICK
+from mbsim.laws.catalog import BRANCHES, STICK
 from mbsim.laws.catalog import SLIP as SLIDING
 
 
@@ -282,24 +280,17 @@ def carried_error(scene: Scene, e: F1, s: int) -> float:
     """Return the velocity as which e in what friction in slot s integrates counts.
 
     Where it slips that is the way of slip over the spring's length, which acts only across the
-    force. Bristles that touch since the step began count by their force: what hardly presses yet
-    gives them none, and what is wrong of them is forgotten before it does.
+    force.
     """
     row, at = scene.work.slot[s], scene.slots.z[s]
     if scene.state.mode[s] % BRANCHES == SLIDING:
         force = math.hypot(row[ALONG_X], row[ALONG_Y])
         across = row[ALONG_X] * e[at + 1] - row[ALONG_Y] * e[at]
         return row[UNIT] * across / force if force > 0.0 else 0.0
-    square, bent = 0.0, 0.0
+    square = 0.0
     for j in range(scene.contacts.carried[contact_of(scene, s)]):
         square += e[at + j] * e[at + j]
-        bent += scene.work.memory[s, j] ** 2
-    part = 1.0
-    if scene.state.touching[s] == 0 and row[BRANCH] == 0.0:
-        pull = slipping_mass(scene, s) * (row[UNIT] / LASTS) ** 2 * math.sqrt(bent)
-        force = math.hypot(row[ALONG_X], row[ALONG_Y])
-        part = force / pull if pull > force else 1.0
-    return part * row[UNIT] * math.sqrt(square)
+    return row[UNIT] * math.sqrt(square)
 
 
 @jitable

@@ -86,7 +86,7 @@ EARLY = 1e-3
 #: What is kept: z, or M; z where it slips, M and its rate w then; time then; twist less turn since
 #: touch, and the sign of its slip; mode; how far it is beyond the committed branch, a smooth number
 #: that is 0 where the branch changes, or 0 where none is known.
-KEPT_Z, _M, KEPT_W, _TIME, _TWIST, _TURNS, _MODE, KEPT_LEFT = 2, 4, 6, 8, 9, 10, 11, 12
+KEPT_Z, _M, KEPT_W, _TIME, _TWIST, _TURNS, _MODE, _LEFT = 2, 4, 6, 8, 9, 10, 11, 12
 
 
 @jitable
@@ -239,7 +239,7 @@ def rigid(
     uses_x=True,
     takes_function=True,
     modes=True,
-    left=KEPT_LEFT,
+    left=_LEFT,
     rigid=FrictionLaw(
         "STICTION", rigid, _RIGID_PARAMETERS, memory=5, takes_function=True, modes=True
     ),
@@ -370,9 +370,6 @@ def stiction(  # noqa: C901
     else:
         size, unit = holds / k, LASTS * k / heavy
         rx, ry = v[0] - ease * px, v[1] - ease * py
-    if before == BEGUN and holds < k * length:
-        # all that is beyond the limit is cut off: an error of it turns what is left
-        unit *= holds / (k * length)
     if mode == STICK:
         px, py = zx, zy
     elif before != SLIP:
