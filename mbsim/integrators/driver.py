@@ -47,7 +47,7 @@ from mbsim.integrators.control import (
     smallest_step,
     starting_step,
 )
-from mbsim.integrators.newton import check_repeats, rounding_of
+from mbsim.integrators.newton import check_repeats
 from mbsim.integrators.positions import jumps
 from mbsim.integrators.rows import look_inside, outputs
 from mbsim.integrators.scheme import (
@@ -182,7 +182,6 @@ def length(
         if steps.implicit:
             # in a shorter one velocities are rounding errors of positions over h
             limit = max(limit, LOCATED * max(m.memory[OWN_TIME], abs(t)))
-            limit = max(limit, rounding_of(m, 1.0))
         h = min(h, limit)
     h = max(h, floor)
     # no sliver of a step before the end

@@ -50,14 +50,7 @@ from mbsim.integrators.galpha_iteration import (
     step_before,
     true_rate,
 )
-from mbsim.integrators.newton import (
-    QUARTER,
-    as_failure,
-    beyond_rounding,
-    linearise,
-    unless_singular,
-    with_ease,
-)
+from mbsim.integrators.newton import QUARTER, as_failure, linearise, unless_singular, with_ease
 from mbsim.integrators.positions import as_positions, bow, is_rate, put_along, retract
 from mbsim.integrators.scheme import (
     EVALUATIONS,
@@ -223,7 +216,7 @@ def attempt(p: Problem, m: Method, t: float, h: float) -> int:
     code = with_ease(m, m.counts[JACOBIANS], solve_step(p, m, t, h))
     if code != 0:
         return code
-    m.memory[LAST_ERROR] = beyond_rounding(m, h, estimate_error(p, m, t, h))
+    m.memory[LAST_ERROR] = estimate_error(p, m, t, h)
     return 0
 
 

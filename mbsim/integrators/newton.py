@@ -41,11 +41,6 @@ from mbsim.integrators.scheme import (
 #: behind it may grow by so much more from one to the next. Where the error lets steps grow by far
 #: more than is left of the touch or the friction they end in, each was followed by one in vain.
 EASY, EASIER = 1, 1.25
-#: What rounding of positions leaves to velocities, over both and their time: as much as a tenth of
-#: the last digit.
-ROUNDED = 2e-17
-#: What is less than this part of tol is next to nothing of it.
-LITTLE = 0.1
 # what `judge` says
 GO_ON, SOLVED, HOPELESS = range(3)
 #: A step's velocities may be off by this part of its error for what f at its end is not.
@@ -74,25 +69,6 @@ def target(m: Method) -> float:
     """Return how large what is left may be, in the norm of the error."""
     tol = judged_by(m)
     return max(ROUNDING, tol * min(m.memory[LEFT_PART], math.sqrt(tol)))
-
-
-@jitable
-def rounding_of(m: Method, h: float) -> float:
-    """Return what rounding of positions is of the error of a step h, over tol.
-
-    It is that over h, so that shorter steps have more of it: what velocities are put on joints by.
-    """
-    return ROUNDED * m.memory[OWN_TIME] / (h * m.memory[TOL])
-
-
-@jitable
-def beyond_rounding(m: Method, h: float, error: float) -> float:
-    """Return the error, over tol, of a step h, if it is too large less what is rounding of it.
-
-    Rounding that is next to nothing of tol changes no step.
-    """
-    rounding = rounding_of(m, h)
-    return error if error <= 1.0 or rounding < LITTLE else max(0.0, error - rounding)
 
 
 @jitable

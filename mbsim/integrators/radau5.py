@@ -34,7 +34,6 @@ from mbsim.integrators.newton import (
     SOLVED,
     as_failure,
     begin,
-    beyond_rounding,
     is_good_enough,
     judge,
     linearise,
@@ -379,7 +378,7 @@ def estimate_error(p: Problem, m: Method, t: float, h: float) -> None:
         # the last stage, which the trial point is, has been projected
         project(p, m, t + h, h, w)
         error = call_float(p.norm, (p.context, t, h, m.error, m.trial)) / m.memory[TOL]
-    m.memory[LAST_ERROR] = beyond_rounding(m, h, error)
+    m.memory[LAST_ERROR] = error
 
 
 @jitable
