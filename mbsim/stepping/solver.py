@@ -206,19 +206,21 @@ def what_follows(square: float, before: float) -> float:
 
 @jitable
 def sweep_on(
-    p: Points, M: Motion, count: int, may: tuple[float, float], most: int
+    p: Points, M: Motion, count: int, may: tuple[float, float], most: int, alone: bool
 ) -> tuple[float, int, bool]:
     """Improve r and v of `count` points; return what a sweep still changes, sweeps, if solved.
 
     That is of a velocity, over what may be left of it, `least` of its point: `may` is a factor of
     that, and the part of jumps. Sweeps end where one of all pairs changes less than 1 in the square
     mean over what presses, and nowhere more than `WORST`, and those to come would change no more
-    than `SLACK`; or with `most`. Between them impulses go on along the way of the sweeps before,
-    as conjugate gradients do, which is dropped where a sweep changes more than the last one.
+    than `SLACK`; or with `most`. Where sweeps are `alone`, and Newton's method does not finish what
+    they leave, they go on for that only as long as they took before. Between them impulses go on
+    along the way of the sweeps before, as conjugate gradients do, which is dropped where a sweep
+    changes more than the last one.
     Source: M. Silcowitz, S. Niebe, K. Erleben, A nonsmooth nonlinear conjugate gradient method for
     interactive contact force problems, The Visual Computer 26 (2010) 893.
     """
-    left, before, sweeps, whole, solved = 0.0, 0.0, 0, True, True
+    left, before, sweeps, whole, solved, first = 0.0, 0.0, 0, True, True, most
     for k in range(count):
         p.counts[k] = 1.0 / (may[0] * p.least[k])
         for a in range(3):
@@ -231,7 +233,8 @@ def sweep_on(
             let_jumps_count(p, M, count, may[0], may[1])
         solved = left <= 1.0 or (left <= WORST and mean <= 1.0)
         square = gradient(p, count)
-        if solved and left > EASY:
+        first = min(first, sweeps) if solved else most
+        if solved and left > EASY and not (alone and sweeps >= 2 * first):
             solved = sweeps > 1 and mean * what_follows(square, before) <= SLACK
         if (solved and whole) or sweeps == most or not math.isfinite(left):
             break
@@ -323,7 +326,8 @@ def solve_points(
     where little changed; Newton's method does what they leave, and sweeps what it leaves.
     """
     most = FEW_SWEEPS if count <= FEW_POINTS else MOST_SWEEPS
-    left, sweeps, solved = sweep_on(p, M, count, may, most)
+    alone = pressing(p, count) > NEWTON_POINTS or some_wide(p, count)
+    left, sweeps, solved = sweep_on(p, M, count, may, most, alone)
     if solved:
         return left, sweeps, 0, solved
     newtons = 0
@@ -333,7 +337,7 @@ def solve_points(
         closed = list_closed(p, M, count)
         if 0 < len(closed) <= NEWTON_POINTS:
             newtons = finish(p, M, ground, closed, may[0])
-    left, more, solved = sweep_on(p, M, count, may, MOST_SWEEPS)
+    left, more, solved = sweep_on(p, M, count, may, MOST_SWEEPS, True)
     if not math.isfinite(left):
         begin_anew(p, M, count)
         change_all(p, M.changed, count, 0)
