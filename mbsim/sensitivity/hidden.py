@@ -21,16 +21,14 @@ from mbsim.sensitivity.timed import (
     CHANGES,
     END,
     MIDDLE,
-    change_of,
-    copy_row,
     evaluate_at,
     largest_of,
 )
-from mbsim.sensitivity.twin import half_step, set_parameter
+from mbsim.sensitivity.twin import change_of, half_step, half_with_jump, set_parameter
 
-#: What f changes by is no jump below this part of it; a half of a stretch in which it jumps has
-#: more of what it changes by than UNEVEN; a side changes as the run does up to ALIKE of that.
-SMOOTH, UNEVEN, ALIKE = 1e-8, 0.6, 1e-2
+#: What f changes by is no jump below this part of it; a side changes as the run does up to ALIKE of
+#: that.
+SMOOTH, ALIKE = 1e-8, 1e-2
 #: f that changes no faster than so many times as fast as in the step before does not jump: a step
 #: over a jump is a short one.
 FASTER = 1.3
@@ -71,7 +69,8 @@ def jump_within(V: Variations, scene: Scene, m: Method, h: float) -> float:
     least = max(FOUND, ROUNDINGS * abs(m.memory[TIME]) / h)
     for i in range(len(m.y)):
         V.sides[BEGIN, i], V.sides[END, i] = m.k[0, i], V.jump[F_BEFORE, i]
-    whole, none = change_of(V, BEGIN, END), SMOOTH * max(largest_of(V, BEGIN), largest_of(V, END))
+    whole = change_of(V, V.sides[BEGIN], V.sides[END])
+    none = SMOOTH * max(largest_of(V, BEGIN), largest_of(V, END))
     V.line[USUAL_CHANGE] = whole / h
     if not same_touch(scene) or whole <= FASTER * before * h:
         return math.nan
@@ -82,16 +81,11 @@ def jump_within(V: Variations, scene: Scene, m: Method, h: float) -> float:
         middle = 0.5 * (begin + end)
         if ask_within(V, scene, m, h, middle, 0, 0.0, MIDDLE) != 0:
             return math.nan
-        first, last = change_of(V, BEGIN, MIDDLE), change_of(V, MIDDLE, END)
-        if not max(first, last) > UNEVEN * whole:
+        half = half_with_jump(V, V.sides, (BEGIN, MIDDLE, END), whole)
+        if half < 0:
             return math.nan
-        if first > last:
-            end = middle
-            copy_row(V, MIDDLE, END)
-        else:
-            begin = middle
-            copy_row(V, MIDDLE, BEGIN)
-        whole = max(first, last)
+        begin, end = (begin, middle) if half == 0 else (middle, end)
+        whole = change_of(V, V.sides[BEGIN], V.sides[END])
     return math.nan
 
 

@@ -39,6 +39,7 @@ from mbsim.sensitivity.arrays import (
     Variations,
 )
 from mbsim.sensitivity.tableaus import LAST, OF_FIFTH, OF_THIRD, ORDER
+from mbsim.sensitivity.twin import change_of, half_with_jump
 
 #: After so many tries that led no farther than this part of a stretch less is asked for; the
 #: shortest part of a step.
@@ -57,9 +58,8 @@ MANY, LONGER = 3, 2.5
 #: A part whose error is this part of what that of a longer one tells, or where that of the shorter
 #: one is hardly less, has a bend behind it, or in it.
 FAR_LESS, HARDLY = 1e-2, 2.0
-#: Of what D' changes by half of a stretch with a bend has more than this; what the error of the
-#: part across it is to be, over what it may be.
-UNEVEN, ACROSS = 0.6, 0.1
+#: What the error of the part across a bend is to be, over what it may be.
+ACROSS = 0.1
 #: Where neither half has more a bend is that the stretch has become so much shorter.
 NARROW = 0.3
 #: Rows of `Variations.work`: D' at the begin, the middle and the end of what is searched.
@@ -119,15 +119,6 @@ def seems_bent(V: Variations, q: float, part: float, error: float, order: float)
 
 
 @jitable
-def change_of(V: Variations, row: int, other: int) -> float:
-    """Return by how much D' differs in two rows of `work`, in usual sizes."""
-    largest = 0.0
-    for i in range(len(V.scale)):
-        largest = max(largest, abs(V.work[row, i] - V.work[other, i]) / V.scale[i])
-    return largest
-
-
-@jitable
 def ask_ahead(
     V: Variations,
     scene: Scene,
@@ -162,20 +153,17 @@ def find_bend(
     V.line[WALL] = math.inf
     code = ask_ahead(V, scene, t, h, k, span, (q, low), e, AT_BEGIN)
     code = code or ask_ahead(V, scene, t, h, k, span, (q, far), e, AT_END)
-    whole = change_of(V, AT_BEGIN, AT_END)
+    whole = change_of(V, w[AT_BEGIN], w[AT_END])
     while code == 0 and high - low > least:
         middle = 0.5 * (low + high)
         code = ask_ahead(V, scene, t, h, k, span, (q, middle), e, AT_MIDDLE)
-        first, last = change_of(V, AT_BEGIN, AT_MIDDLE), change_of(V, AT_MIDDLE, AT_END)
-        if not max(first, last) > UNEVEN * whole:
+        half = half_with_jump(V, w, (AT_BEGIN, AT_MIDDLE, AT_END), whole)
+        if half < 0:
             if high - low > NARROW * far:
                 return code
             break
-        row = AT_END if first > last else AT_BEGIN
-        low, high = (low, middle) if first > last else (middle, high)
-        for i in range(w.shape[1]):
-            w[row, i] = w[AT_MIDDLE, i]
-        whole = max(first, last)
+        low, high = (low, middle) if half == 0 else (middle, high)
+        whole = change_of(V, w[AT_BEGIN], w[AT_END])
     V.line[BEND], V.line[BEHIND_BEND] = q + low, q + high
     return code
 

@@ -30,7 +30,7 @@ from mbsim.sensitivity.arrays import (
     UNTIL,
     Variations,
 )
-from mbsim.sensitivity.twin import set_parameter, widest_step
+from mbsim.sensitivity.twin import change_of, set_parameter, widest_step
 
 #: Rows of `Variations.sides`: f before and behind a jump, and between; at either end of what is
 #: searched; by how much the run's f changes there; by how much it does without a jump.
@@ -256,7 +256,7 @@ def find_fall(
     about, gap, e = 0.5 * (before + behind), behind - before, CHANGE * V.size[k]
     wide = max(NEAR * e * abs(about) / V.size[k], 4.0 * gap)
     alike = is_alike(V, scene, before - gap, behind + gap, y, k, e)
-    cancels = alike and change_of(V, BEGIN, END) <= SMOOTH * largest_of(V, END)
+    cancels = alike and change_of(V, V.sides[BEGIN], V.sides[END]) <= SMOOTH * largest_of(V, END)
     alike = alike and is_beside(V, scene, before - gap, before - wide, y, k, e)
     alike = alike and is_beside(V, scene, behind + gap, behind + wide, y, k, e)
     if alike and not cancels:
@@ -369,15 +369,6 @@ def look_behind(V: Variations, scene: Scene, m: Method, t: float) -> bool:
     if hops or not V.gap[LAST] == 0.5 * (before + behind):
         find_falls(V, scene, m.trial, before, behind, LAST)
     return hops
-
-
-@jitable
-def change_of(V: Variations, row: int, other: int) -> float:
-    """Return by how much two rows of `sides` differ, at most, in usual sizes."""
-    largest = 0.0
-    for i in range(len(V.scale)):
-        largest = max(largest, abs(V.sides[row, i] - V.sides[other, i]) / V.scale[i])
-    return largest
 
 
 @jitable

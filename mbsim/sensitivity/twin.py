@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from mbsim.arrays.scene import Scene
-from mbsim.core.arrays import F1
+from mbsim.core.arrays import F1, F2
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.core.memory import floats_at
@@ -23,6 +23,8 @@ STEP = 1e-6
 #: The same of places where it is not known how depths of contacts move: these are far smaller than
 #: the model. Where it is known no depth changes by more than a part of itself.
 STEP_OF_CONTACTS, PART_OF_DEPTH = 1e-9, 1e-6
+#: A half of a stretch in which something jumps has more than this part of what it changes by.
+UNEVEN = 0.6
 
 
 @jitable
@@ -90,6 +92,31 @@ def reach_of(V: Variations, width: float, other: int) -> float:
         if up != down:
             reach = min(reach, abs(width) * PART_OF_DEPTH * min(up, down) / abs(up - down))
     return reach
+
+
+@jitable
+def change_of(V: Variations, one: F1, other: F1) -> float:
+    """Return by how much two derivatives in time differ at most, in usual sizes."""
+    largest = 0.0
+    for i in range(len(V.scale)):
+        largest = max(largest, abs(one[i] - other[i]) / V.scale[i])
+    return largest
+
+
+@jitable
+def half_with_jump(V: Variations, rows: F2, at: tuple[int, int, int], whole: float) -> int:
+    """Return which half of a stretch has what a derivative in time jumps by there, -1 for neither.
+
+    `at` are the rows of its begin, middle and end, and `whole` is what it changes by in all. The
+    row of the middle is copied to the end that is left.
+    """
+    begin, middle, end = at
+    first, last = change_of(V, rows[begin], rows[middle]), change_of(V, rows[middle], rows[end])
+    if not max(first, last) > UNEVEN * whole:
+        return -1
+    half = 0 if first > last else 1
+    rows[end if half == 0 else begin, :] = rows[middle]
+    return half
 
 
 @jitable
