@@ -38,7 +38,7 @@ from mbsim.stepping.arrays import (
 )
 from mbsim.stepping.carried import carry_held, is_carried
 from mbsim.stepping.displacements import meets_at
-from mbsim.stepping.points import deepest_of, is_point, put_place, slop_of, take_rows
+from mbsim.stepping.points import bodies_of, deepest_of, is_point, put_place, slop_of, take_rows
 from mbsim.stepping.scales import group_at, noise_of
 
 #: A pair goes ahead by this part of its whole motion at least, and so beyond where it touches.
@@ -331,9 +331,7 @@ def keep_frames(scene: Scene, M: Motion, pair: int) -> None:
 @jitable
 def one_is_carried(scene: Scene, S: Stepping, pair: int, h: float) -> bool:
     """Return whether others carry one body of a pair in a step h, and the other one flies."""
-    i = scene.graphics.body[scene.pairs.graphic_i[pair]]
-    j = scene.graphics.body[scene.pairs.graphic_j[pair]]
-    ground = len(S.rest.body)
+    (i, j), ground = bodies_of(scene, pair), len(S.rest.body)
     if i == ground or j == ground:
         return False
     carry_held(scene, S, h)
@@ -416,8 +414,7 @@ def take_where_it_meets(
     impulses, which say where it meets: those stay as they are too.
     """
     M, t, now = S.motion, h, S.motion.taken[len(S.motion.taken) - 1]
-    i = scene.graphics.body[scene.pairs.graphic_i[pair]]
-    j = scene.graphics.body[scene.pairs.graphic_j[pair]]
+    i, j = bodies_of(scene, pair)
     if M.pressed[i] != now and M.pressed[j] != now and not touches(S, first):
         t = first_meeting(S, first, h)
     if t == h:

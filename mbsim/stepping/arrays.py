@@ -135,7 +135,7 @@ class Motion(NamedTuple):
     before: F2  # (nb + 1, 6) velocity at the step's begin
     free: F2  # (nb + 1, 6) at its end, were there no contacts
     carried: F2  # (nb + 1, 6) of `free - before`, what contacts take off it, see `carried`
-    asked: I1  # (1,) whether that is known of bodies that joints or forces hold, or is nothing
+    known: I1  # (1,) 1 where that is known of bodies that joints or forces hold, or is nothing
     flight: F2  # (nb + 1, 6) at the step's end, if nothing but these contacts presses
     v: F2  # (nb + 1, 6) with them
     guess: F2  # (nb, 6) as the last solution of the step had it, by which forces are
@@ -379,7 +379,7 @@ def make(
         before=numbers(nb + 1, 6),
         free=numbers(nb + 1, 6),
         carried=numbers(nb + 1, 6),
-        asked=whole(1),
+        known=whole(1),
         flight=numbers(nb + 1, 6),
         v=numbers(nb + 1, 6),
         guess=numbers(nb, 6),

@@ -18,13 +18,12 @@ from mbsim.stepping.arrays import (
     KEPT_BODY_I,
     KEPT_FORCE,
     KEPT_HIT_I,
-    LENGTH,
     SLEEPING_ROWS,
     SLOP,
     Stepping,
 )
 from mbsim.stepping.held import begin_impulse, turn_into_velocities
-from mbsim.stepping.scales import group_at
+from mbsim.stepping.scales import distance, group_at, speed_of
 
 #: Two velocities of a body are not the same if they differ by more than this part of what forces
 #: without contacts change of its velocity in the step.
@@ -49,18 +48,6 @@ def carries(S: Stepping, k: int) -> bool:
     i, j, ground = S.points.body[k, 0], S.points.body[k, 1], len(S.rest.body)
     known = (i == ground or is_carried(S, i)) and (j == ground or is_carried(S, j))
     return known and S.points.was[k] >= 0
-
-
-@jitable
-def distance(S: Stepping, b: int, v: F2, w: F2) -> float:
-    """Return the largest component by which two velocities of a body differ.
-
-    Spins count by how fast they move what is the length of its group away.
-    """
-    length, most = S.plan.scale[S.plan.connected[b], LENGTH], 0.0
-    for c in range(6):
-        most = max(most, (1.0 if c < 3 else length) * abs(v[b, c] - w[b, c]))
-    return most
 
 
 @jitable
@@ -92,7 +79,7 @@ def distance_held(S: Stepping, b: int, v: F2, w: F2) -> float:
 
 
 @jitable
-def fly_by(S: Stepping, b: int, v: F2) -> None:
+def fly_to(S: Stepping, b: int, v: F2) -> None:
     """Let a body, and those that joints or forces hold to it, fly to velocities v."""
     M, plan, g = S.motion, S.plan, S.plan.group[b]
     if g < 0:
@@ -108,12 +95,8 @@ def rests_alone(S: Stepping, b: int, h: float) -> bool:
 
     What turns round in the air changes its velocity by more.
     """
-    M, way = S.motion, 0.0
-    length = S.plan.scale[S.plan.connected[b], LENGTH]
-    for c in range(6):
-        fastest = max(abs(M.before[b, c]), abs(M.v[b, c]))
-        way = max(way, h * (1.0 if c < 3 else length) * fastest)
-    if way > S.plan.scale[S.plan.connected[b], SLOP]:
+    M, slop = S.motion, S.plan.scale[S.plan.connected[b], SLOP]
+    if h * max(speed_of(S, b, M.before), speed_of(S, b, M.v)) > slop:
         return False
     return distance(S, b, M.v, M.before) <= HELD_UP * distance(S, b, M.free, M.before)
 
@@ -164,11 +147,7 @@ def fill_flight(scene: Scene, S: Stepping) -> None:
 @jitable
 def lies(S: Stepping, b: int, h: float) -> bool:
     """Return whether a body goes no way that counts as it moves at the step's begin."""
-    plan = S.plan
-    length, way = plan.scale[plan.connected[b], LENGTH], 0.0
-    for c in range(6):
-        way = max(way, h * (1.0 if c < 3 else length) * abs(S.motion.before[b, c]))
-    return way <= plan.scale[plan.connected[b], SLOP]
+    return h * speed_of(S, b, S.motion.before) <= S.plan.scale[S.plan.connected[b], SLOP]
 
 
 @jitable
@@ -193,7 +172,7 @@ def changes(S: Stepping, b: int, c: int, f: V3, T: V3) -> float:
 
 
 @jitable
-def take_off(S: Stepping, b: int, h: float) -> None:
+def settle_flight(S: Stepping, b: int, h: float) -> None:
     """Let a body, and what joints or forces hold to it, fly with what carries it.
 
     That is none where it is more than forces without contacts do.
@@ -201,9 +180,9 @@ def take_off(S: Stepping, b: int, h: float) -> None:
     M, plan, g = S.motion, S.plan, S.plan.group[b]
     alone = distance_held(S, b, M.free, M.before)
     if distance_held(S, b, M.flight, M.free) > (1.0 + OTHERWISE) * alone:
-        fly_by(S, b, M.free)
+        fly_to(S, b, M.free)
     elif distance_held(S, b, M.flight, M.before) <= NOTHING * alone and lies(S, b, h):
-        fly_by(S, b, M.before)
+        fly_to(S, b, M.before)
     first, last = (plan.first[g], plan.first[g + 1]) if g >= 0 else (0, 1)
     for row in range(first, last):
         m = plan.members[row] if g >= 0 else b
@@ -220,14 +199,14 @@ def find_carried(scene: Scene, S: Stepping, h: float) -> None:
     bodies that joints or forces hold that is asked for where something hits, see `carry_held`.
     """
     M, kept = S.motion, S.kept
-    M.asked[0] = 1
+    M.known[0] = 1
     for row in range(bodies_awake(scene)):
         M.carried[body_awake(scene, row), :] = 0.0
     for row in range(kept.count[SLEEPING_ROWS], kept.count[0]):
         for side in range(2):
             b, f, T = impulse_of(S, row, side, h)
             if b >= 0 and S.plan.group[b] >= 0:
-                M.asked[0] = 0
+                M.known[0] = 0
             elif b >= 0:
                 for c in range(6):
                     M.carried[b, c] += changes(S, b, c, f, T)
@@ -235,7 +214,7 @@ def find_carried(scene: Scene, S: Stepping, h: float) -> None:
     for row in range(bodies_awake(scene)):
         b = body_awake(scene, row)
         if S.plan.group[b] < 0 and is_carried(S, b):
-            take_off(S, b, h)
+            settle_flight(S, b, h)
 
 
 @jitable
@@ -245,9 +224,9 @@ def carry_held(scene: Scene, S: Stepping, h: float) -> bool:
     That takes a solution of their linear system. Return False if it is known, or is nothing.
     """
     M, kept, plan = S.motion, S.kept, S.plan
-    if M.asked[0] == 1:
+    if M.known[0] == 1:
         return False
-    M.asked[0] = 1
+    M.known[0] = 1
     begin_impulse(S)
     for row in range(kept.count[SLEEPING_ROWS], kept.count[0]):
         for side in range(2):
@@ -263,5 +242,5 @@ def carry_held(scene: Scene, S: Stepping, h: float) -> bool:
         for c in range(6):
             M.flight[b, c] = M.free[b, c] + M.impulse[6 * b + c]
     for g in range(len(plan.first) - 1):
-        take_off(S, plan.members[plan.first[g]], h)
+        settle_flight(S, plan.members[plan.first[g]], h)
     return True

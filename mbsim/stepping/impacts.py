@@ -15,7 +15,7 @@ from mbsim.stepping.arrays import (
     W_NN,
     Stepping,
 )
-from mbsim.stepping.carried import OTHERWISE, distance_held, fly_by, rests
+from mbsim.stepping.carried import OTHERWISE, distance_held, fly_to, rests
 from mbsim.stepping.displacements import NO_IMPACT, meets_at
 from mbsim.stepping.one_point import apply, velocity_of
 from mbsim.stepping.scales import group_at, noise_of
@@ -109,7 +109,7 @@ def let_carry(S: Stepping, count: int, h: float) -> bool:
             off = distance_held(S, b, M.flight, M.before)
             if off > OTHERWISE * distance_held(S, b, M.free, M.before) and rests(S, b, h):
                 some = True
-                fly_by(S, b, M.before)
+                fly_to(S, b, M.before)
     if some:
         for k in range(count):
             if P.part[k] != NO_IMPACT:

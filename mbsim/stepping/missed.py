@@ -29,7 +29,7 @@ from mbsim.stepping.ahead import (
 from mbsim.stepping.arrays import ASLEEP, POINTS, SOME_AHEAD, Stepping
 from mbsim.stepping.awake import pair_awake, pairs_awake
 from mbsim.stepping.pairs import meets_sleeper
-from mbsim.stepping.points import deepest_of, is_point, take_rows
+from mbsim.stepping.points import bodies_of, deepest_of, is_point, take_rows
 from mbsim.stepping.sleep import both_sleep, one_sleeps, wake
 
 #: A point is another one of a pair if it is as far from the others, over the smaller radius.
@@ -41,12 +41,19 @@ def is_known(S: Stepping, k: int, near: float) -> bool:
     """Return whether a point before point k is of the same pair, and as near to it."""
     P = S.points
     for other in range(k):
-        if (
-            P.key[other] == P.key[k]
-            and norm(sub(vector(P.point[other]), vector(P.point[k]))) < near
-        ):
+        away = sub(vector(P.point[other]), vector(P.point[k]))
+        if P.key[other] == P.key[k] and norm(away) < near:
             return True
     return False
+
+
+@jitable
+def fill_way(scene: Scene, S: Stepping, pair: int) -> None:
+    """Fill `M.way` by the motion that impulses gave the pair's bodies, and keep its frames."""
+    i, j = bodies_of(scene, pair)
+    for c in range(6):
+        S.motion.way[0, c], S.motion.way[1, c] = S.motion.shift[i, c], S.motion.shift[j, c]
+    keep_frames(scene, S.motion, pair)
 
 
 @jitable
@@ -56,12 +63,7 @@ def meets_after_all(scene: Scene, S: Stepping, y: F1, pair: int, h: float) -> bo
     Return False if there is no room.
     """
     M, room = S.motion, True
-    keep_frames(scene, M, pair)
-    for side in range(2):
-        g = scene.pairs.graphic_i[pair] if side == 0 else scene.pairs.graphic_j[pair]
-        b = scene.graphics.body[g]
-        for c in range(6):
-            M.way[side, c] = M.shift[b, c]
+    fill_way(scene, S, pair)
     measure_pair(scene, pair)
     t = find_touch(scene, S, y, pair, h, deepest_of(scene, S, pair))
     if t >= 0.0:
@@ -79,14 +81,10 @@ def turns_in(scene: Scene, S: Stepping, y: F1, pair: int, h: float) -> bool:
     """
     M, count, room = S.motion, S.tally.count, True
     gi, gj = scene.pairs.graphic_i[pair], scene.pairs.graphic_j[pair]
-    for side in range(2):
-        b = scene.graphics.body[gi if side == 0 else gj]
-        for c in range(6):
-            M.way[side, c] = M.shift[b, c]
+    fill_way(scene, S, pair)
     most = touching(scene, S, gi, gj)
     if h * (fastest_point(scene, gi, M.way[0]) + fastest_point(scene, gj, M.way[1])) <= most:
         return True
-    keep_frames(scene, M, pair)
     for c in range(3):
         M.push[c] = 0.0
     if measure_ahead(scene, S, y, pair, h) > most:
@@ -129,7 +127,7 @@ def find_missed(scene: Scene, S: Stepping, y: F1, h: float) -> int:
     for k in range(pairs_awake(scene, S)):
         pair = pair_awake(scene, S, k)
         gi, gj = pairs.graphic_i[pair], pairs.graphic_j[pair]
-        i, j = scene.graphics.body[gi], scene.graphics.body[gj]
+        i, j = bodies_of(scene, pair)
         if both_sleep(S, i, j):
             continue
         went = M.went[gi] + M.went[gj]

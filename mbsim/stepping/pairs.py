@@ -20,7 +20,7 @@ from mbsim.dynamics.contact.detection import measure_pair
 from mbsim.stepping.ahead import look_ahead_of, note_pressed, take_where_it_meets
 from mbsim.stepping.arrays import ASLEEP, POINTS, Stepping
 from mbsim.stepping.awake import pair_awake, pairs_awake
-from mbsim.stepping.points import deepest_of, fill_reach, take_rows
+from mbsim.stepping.points import bodies_of, deepest_of, fill_reach, take_rows
 from mbsim.stepping.sleep import both_sleep, one_sleeps, wake
 
 
@@ -75,7 +75,7 @@ def find_points(scene: Scene, S: Stepping, y: F1, h: float, committed: bool) -> 
     for k in range(pairs_awake(scene, S)):
         pair = pair_awake(scene, S, k)
         gi, gj = pairs.graphic_i[pair], pairs.graphic_j[pair]
-        i, j = scene.graphics.body[gi], scene.graphics.body[gj]
+        i, j = bodies_of(scene, pair)
         if both_sleep(S, i, j):
             continue
         reach = S.motion.reach[gi] + S.motion.reach[gj]

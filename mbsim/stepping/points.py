@@ -59,6 +59,13 @@ def fill_reach(scene: Scene, S: Stepping, h: float) -> None:
 
 
 @jitable
+def bodies_of(scene: Scene, pair: int) -> tuple[int, int]:
+    """Return the bodies of a pair's two graphics."""
+    body, pairs = scene.graphics.body, scene.pairs
+    return body[pairs.graphic_i[pair]], body[pairs.graphic_j[pair]]
+
+
+@jitable
 def deepest_of(scene: Scene, S: Stepping, pair: int) -> float:
     """Return the largest depth of a measured pair."""
     deepest, first = -math.inf, scene.pairs.slot[pair]

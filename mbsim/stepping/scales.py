@@ -6,14 +6,36 @@ What else there is in a model, however large or fast, changes nothing of them
 
 from __future__ import annotations
 
+from mbsim.core.arrays import F2
 from mbsim.core.jitable import jitable
-from mbsim.stepping.arrays import LEFT, LEFT_SPEED, NOISE, SPEED, Stepping
+from mbsim.stepping.arrays import LEFT, LEFT_SPEED, LENGTH, NOISE, SPEED, Stepping
 
 #: Closing and slipping are none up to so many times what the solver may leave of a velocity at
 #: most, however short a step.
 NOISE_OF_SPEED = 30.0
 #: What stands still is solved so many times closer, but not below this part of its group's speed.
 CLOSER, ROUNDING = 0.01, 1e-11
+
+
+@jitable
+def speed_of(S: Stepping, b: int, v: F2) -> float:
+    """Return the largest component of a body's velocity.
+
+    Spins count by how fast they move what is the length of its group away.
+    """
+    length, most = S.plan.scale[S.plan.connected[b], LENGTH], 0.0
+    for c in range(6):
+        most = max(most, (1.0 if c < 3 else length) * abs(v[b, c]))
+    return most
+
+
+@jitable
+def distance(S: Stepping, b: int, v: F2, w: F2) -> float:
+    """Return `speed_of` of what two velocities of a body differ by."""
+    length, most = S.plan.scale[S.plan.connected[b], LENGTH], 0.0
+    for c in range(6):
+        most = max(most, (1.0 if c < 3 else length) * abs(v[b, c] - w[b, c]))
+    return most
 
 
 @jitable
@@ -35,7 +57,7 @@ def left_of(S: Stepping, g: int, h: float) -> float:
 
 
 @jitable
-def closer(S: Stepping, g: int, h: float) -> float:
+def left_at_rest(S: Stepping, g: int, h: float) -> float:
     """Return `left_of` where nothing of an island moves by what counts: piles come to rest, sleep.
 
     What a loose solution leaves of velocities goes on from step to step, and lets stacks fall over.

@@ -32,7 +32,6 @@ from mbsim.stepping.arrays import (
     KEPT_BODY_J,
     KEPT_CONTACT,
     KEPT_FORCE,
-    LENGTH,
     MAY_SLEEP,
     OWN_TIME,
     POINTS,
@@ -44,7 +43,7 @@ from mbsim.stepping.arrays import (
 )
 from mbsim.stepping.free_motion import stand
 from mbsim.stepping.kept import index_kept
-from mbsim.stepping.scales import left_of, noise_of
+from mbsim.stepping.scales import left_of, noise_of, speed_of
 
 #: Steps in a row in which a body has to be still, and for how long, over its group's own time L/V.
 CALM, LONG = 16, 0.25
@@ -183,12 +182,7 @@ def find_islands(scene: Scene, S: Stepping) -> None:
 @jitable
 def goes_nowhere(S: Stepping, b: int, h: float) -> bool:
     """Return whether a body goes no way in a step h that counts as closing or slipping."""
-    before, g = S.motion.before[b], S.plan.connected[b]
-    most, length = noise_of(S, g, h), S.plan.scale[g, LENGTH]
-    for c in range(6):
-        if (1.0 if c < 3 else length) * abs(before[c]) > most:
-            return False
-    return True
+    return speed_of(S, b, S.motion.before) <= noise_of(S, S.plan.connected[b], h)
 
 
 @jitable

@@ -206,17 +206,17 @@ def what_follows(square: float, before: float) -> float:
 
 @jitable
 def sweep_on(
-    p: Points, M: Motion, count: int, may: tuple[float, float], most: int, alone: bool
+    p: Points, M: Motion, count: int, may: tuple[float, float], most: int, newton: bool
 ) -> tuple[float, int, bool]:
     """Improve r and v of `count` points; return what a sweep still changes, sweeps, if solved.
 
     That is of a velocity, over what may be left of it, `least` of its point: `may` is a factor of
     that, and the part of jumps. Sweeps end where one of all pairs changes less than 1 in the square
     mean over what presses, and nowhere more than `WORST`, and those to come would change no more
-    than `SLACK`; or with `most`. Where sweeps are `alone`, and Newton's method does not finish what
-    they leave, they go on for that only as long as they took before. Between them impulses go on
-    along the way of the sweeps before, as conjugate gradients do, which is dropped where a sweep
-    changes more than the last one.
+    than `SLACK`; or with `most`. Where `newton` does not finish what they leave they go on for that
+    only as long as they took before. Between them impulses go on along the way of the sweeps
+    before, as conjugate gradients do, which is dropped where a sweep changes more than the last
+    one.
     Source: M. Silcowitz, S. Niebe, K. Erleben, A nonsmooth nonlinear conjugate gradient method for
     interactive contact force problems, The Visual Computer 26 (2010) 893.
     """
@@ -234,7 +234,7 @@ def sweep_on(
         solved = left <= 1.0 or (left <= WORST and mean <= 1.0)
         square = gradient(p, count)
         first = min(first, sweeps) if solved else most
-        if solved and left > EASY and not (alone and sweeps >= 2 * first):
+        if solved and left > EASY and (newton or sweeps < 2 * first):
             solved = sweeps > 1 and mean * what_follows(square, before) <= SLACK
         if (solved and whole) or sweeps == most or not math.isfinite(left):
             break
@@ -326,8 +326,8 @@ def solve_points(
     where little changed; Newton's method does what they leave, and sweeps what it leaves.
     """
     most = FEW_SWEEPS if count <= FEW_POINTS else MOST_SWEEPS
-    alone = pressing(p, count) > NEWTON_POINTS or some_wide(p, count)
-    left, sweeps, solved = sweep_on(p, M, count, may, most, alone)
+    newton = pressing(p, count) <= NEWTON_POINTS and not some_wide(p, count)
+    left, sweeps, solved = sweep_on(p, M, count, may, most, newton)
     if solved:
         return left, sweeps, 0, solved
     newtons = 0
@@ -337,7 +337,7 @@ def solve_points(
         closed = list_closed(p, M, count)
         if 0 < len(closed) <= NEWTON_POINTS:
             newtons = finish(p, M, ground, closed, may[0])
-    left, more, solved = sweep_on(p, M, count, may, MOST_SWEEPS, True)
+    left, more, solved = sweep_on(p, M, count, may, MOST_SWEEPS, False)
     if not math.isfinite(left):
         begin_anew(p, M, count)
         change_all(p, M.changed, count, 0)

@@ -39,7 +39,6 @@ from mbsim.stepping.arrays import (
     HIT,
     KEPT_STICKS,
     LEFT_PART,
-    LENGTH,
     MAY_BE_LEFT,
     NEWTONS,
     POINTS,
@@ -93,7 +92,7 @@ from mbsim.stepping.one_point import apply, fill_drift, velocity_of
 from mbsim.stepping.pairs import find_points
 from mbsim.stepping.points import fill_answers, fill_point, fill_reach, way_at
 from mbsim.stepping.rebound import limit_rebound
-from mbsim.stepping.scales import closer, group_at, left_of, noise_of
+from mbsim.stepping.scales import distance, group_at, left_at_rest, left_of, noise_of
 from mbsim.stepping.sleep import find_still, is_still, wake_loaded
 from mbsim.stepping.solver import move_farther, project_positions, solve_points
 
@@ -173,14 +172,15 @@ def prepare_points(scene: Scene, S: Stepping, h: float) -> int:
         begin += P.many[k] if P.wide[k] >= 0 else 0
     fill_answers(scene, S)
     recall(S, h)
-    find_still(scene, S, h)
+    if count > 0:
+        find_still(scene, S, h)
     for k in range(count):
         x, z = velocity_of(P, k, 1, M.before), velocity_of(P, k, 2, M.before)
         slip, row = math.sqrt(x * x + z * z), P.was[k]
         g = group_at(S, k)
         P.speed[k], P.least[k] = S.plan.scale[g, SPEED], left_of(S, g, h)
         if is_still(S, k):
-            P.least[k] = closer(S, g, h)
+            P.least[k] = left_at_rest(S, g, h)
         if row >= 0 and slip <= noise_of(S, g, h):
             # what stuck moves by what the solver left of it
             slip = 0.0 if S.kept.table[row, KEPT_STICKS] == 1.0 else slip
@@ -374,12 +374,8 @@ def has_settled(scene: Scene, S: Stepping, h: float) -> bool:
     M, root = S.motion, math.sqrt(h * S.forces.number[STIFFNESS] + 1e-300)
     for k in range(bodies_awake(scene)):
         b = body_awake(scene, k)
-        g = S.plan.connected[b]
-        length, most = S.plan.scale[g, LENGTH], noise_of(S, g, h) / root
-        for c in range(6):
-            off = abs(M.v[b, c] - M.guess[b, c])
-            if (off if c < 3 else off * length) > most:
-                return False
+        if distance(S, b, M.v, M.guess) > noise_of(S, S.plan.connected[b], h) / root:
+            return False
     return True
 
 

@@ -48,7 +48,7 @@ def moved(results: mbsim.Results, count: int) -> float:
 def test_a_column_stands(tmp_path: Path, count: int, step: float, tol: float) -> None:
     """It fell over within 7 s, as what sweeps left of velocities went on from step to step.
 
-    The last sweep changed them by no more than may be left, in a column a hundredth of what was.
+    The last sweep changed them by no more than may be left, and in a column each changes little.
     """
     results = column(tmp_path, count, False, step, tol)
     assert results.audit.warnings == ()
