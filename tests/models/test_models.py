@@ -704,7 +704,8 @@ def test_mixed_pile_comes_to_rest():
         assert place[-1, 2] > 4.9
         # what touches in one point or on one line may roll and spin on, as fast as it was left;
         # what leans on others creeps, as friction that is smoothed over 20 mm/s lets it
-        assert np.linalg.norm(speed[late], axis=1).max() < (20.0 if body in (5, 7) else 0.4)
+        most = 20.0 if body in (5, 7) else 0.4 if body in (4, 8) else 0.01
+        assert np.linalg.norm(speed[late], axis=1).max() < most
     assert abs(results.audit.balance) < 0.02 * results.audit.of
 
 
