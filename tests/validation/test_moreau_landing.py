@@ -257,6 +257,28 @@ def test_what_a_joint_holds_to_a_ball_goes_its_way_in_an_impact(tmp_path, h) -> 
     assert square == pytest.approx(square[0], abs=0.01)
 
 
+def gained(folder: Path, h: float | None, tol: float) -> float:
+    """Return by how much energy changes as two balls that a joint holds rebound aslant, over it."""
+    place = (0.0, 0.0, 0.468)
+    parts = [
+        text.sphere(3, 2.0, 0.1, place),
+        text.sphere(4, 1.0, 0.1, (0.0, 0.4, 0.568)),
+        text.marker(35, 3, (0.0, 0.2, 0.468)),
+        text.marker(45, 4, (0.0, 0.2, 0.468)),
+        text.joint(7, "FIXED", 35, 45),
+    ]
+    results = run(folder, parts, 0.0, h, 0.6, tol, 0.6, [300, 400])
+    energy = results["energy/kinetic"] + results["energy/potential"]
+    return float(np.abs(energy - energy[0]).max() / energy[0])
+
+
+def test_energy_of_a_mechanism_that_turns_is_off_by_the_step_where_it_is_hit(tmp_path) -> None:
+    """What joints do is found in the step's midst, and an impact is elsewhere in it: of order 1."""
+    assert gained(tmp_path, 5e-3, 1e-4) < 2e-2
+    assert gained(tmp_path, 5e-4, 1e-4) < 2e-3
+    assert gained(tmp_path, None, 1e-4) < 2e-3
+
+
 @pytest.mark.parametrize(("h", "tol"), [(0.01, 1e-6), (0.01, 1e-4), (0.005, 1e-4), (None, 1e-4)])
 def test_a_torus_that_has_rolled_on_its_rim_lies_flat(tmp_path, h, tol) -> None:
     """It rested tilted by up to 1.4e-3 rad on one of its corners, those across 0.3 mm above."""
