@@ -114,8 +114,9 @@ def half_with_jump(V: Variations, rows: F2, at: tuple[int, int, int], whole: flo
     first, last = change_of(V, rows[begin], rows[middle]), change_of(V, rows[middle], rows[end])
     if not max(first, last) > UNEVEN * whole:
         return -1
-    half = 0 if first > last else 1
-    rows[end if half == 0 else begin, :] = rows[middle]
+    half, row = (0, end) if first > last else (1, begin)
+    for i in range(rows.shape[1]):
+        rows[row, i] = rows[middle, i]
     return half
 
 
