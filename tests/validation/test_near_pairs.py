@@ -372,6 +372,36 @@ def test_falling_apart_needs_no_narrowphase(tmp_path, all_by_broadphase):
     assert results["bodies/2/position"][-1, 2] == pytest.approx(3.0 - 0.5 * 9.81 * 0.16, abs=1e-9)
 
 
+def test_a_moving_plane_is_measured_at_the_distance_of_usual_members(tmp_path, all_by_broadphase):
+    ids = [100 * (2 + k) for k in range(729)]
+    text = balls(block(9, 0.3, jitter=0.02)) + MOVING_PLANE + sets(ids, [900000], **LAW)
+    system = listed(tmp_path, GROUND + text)
+    commit(system.scene, system.y0)
+    frames, graphics = system.scene.work.frames, system.scene.graphics
+    plane, round_ones = np.isinf(graphics.radius), np.isfinite(graphics.radius)
+    moving = plane & (graphics.body < len(system.scene.bodies.mass))
+    away = np.linalg.norm(frames[round_ones, :3] - frames[moving, :3], axis=1) + 0.1
+    lever = system.scene.broadphase.lever[moving]
+    assert lever == pytest.approx(1.0 / np.mean(1.0 / away), rel=0.05)
+
+
+def test_near_pairs_are_listed_before_two_more_steps_leave_their_room(tmp_path, all_by_broadphase):
+    ids = [100 * (2 + k) for k in range(64)]
+    system = listed(tmp_path, GROUND + balls(block(4, 0.6)) + sets(ids, ids, **LAW))
+    scene, y = system.scene, system.y0.copy()
+    commit(scene, y)
+    room = scene.broadphase.room[np.isfinite(scene.broadphase.room)].min()
+    before, step, gone = scene.log.counters[LISTINGS], 0.02 * room, 0.0
+    while scene.log.counters[LISTINGS] == before:
+        y[2 : 13 * 64 : 13] += step
+        gone += step
+        place_bodies(scene, y)
+        assert place_graphics(scene, y)
+        contact_set.follow(scene, y)
+        commit(scene, y)
+    assert room - 3.0 * step < gone <= room
+
+
 @pytest.mark.parametrize("method", ["DOPRI5", "VERLET"])
 def test_resume_of_a_set_is_bit_identical(tmp_path, all_by_broadphase, monkeypatch, method):
     monkeypatch.setattr("mbsim.run.divergence.RETURN_SECONDS", 1e-4)

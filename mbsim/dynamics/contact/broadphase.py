@@ -47,6 +47,11 @@ GIANT = 4.0
 MOST_HALVINGS = 20
 #: Each time what a fast member may go by itself becomes this part of it.
 LESS = 0.8
+#: How far planes that move are from others is measured at so many members, or some more.
+SAMPLE = 64
+#: Pairs are listed anew where a member that went through this part of its room would go out of it
+#: by so many steps as the last one.
+GONE, AHEAD = 0.5, 2.0
 
 
 @jitable
@@ -177,10 +182,8 @@ def add_pair(scene: Scene, contact_set: int, i: int, j: int) -> None:
 def against_all(scene: Scene, contact_set: int, i: int, others: int, skin: float) -> None:
     """List graphic i with those of the contact's other side that are near; 0: it is their J."""
     broadphase = scene.broadphase
-    first, last = (
-        broadphase.first[contact_set, 2 * others],
-        broadphase.first[contact_set, 2 * others + 1],
-    )
+    side = broadphase.first[contact_set]
+    first, last = side[2 * others], side[2 * others + 1]
     for k in range(first, last):
         j = broadphase.member[k]
         if j == i or (broadphase.same[contact_set] == 1 and j > i and not usual_size(scene, j)):
@@ -396,16 +399,16 @@ def close_ranks(scene: Scene) -> None:
 def fill_levers(scene: Scene) -> None:
     """Measure how far planes that move are from a usual member: the harmonic mean.
 
-    What has flown away does not count in it.
+    What has flown away does not count in it. Of many members some are taken, spread over all.
     """
     broadphase, graphics, frames = scene.broadphase, scene.graphics, scene.work.frames
-    usual = broadphase.size[1]
+    usual, apart = broadphase.size[1], max(1, len(broadphase.member) // SAMPLE)
     for at in range(len(broadphase.member)):
         g = broadphase.member[at]
         if graphics.body[g] == len(scene.bodies.mass) or graphics.radius[g] < math.inf:
             continue
         count, total = 0, 0.0
-        for k in range(len(broadphase.member)):
+        for k in range(0, len(broadphase.member), apart):
             other = broadphase.member[k]
             if graphics.radius[other] < math.inf and graphics.body[other] != graphics.body[g]:
                 way = norm(sub(vector(frames[other]), vector(frames[g])))
@@ -461,7 +464,7 @@ def list_pairs(scene: Scene, y: F1) -> None:
 
 @jitable
 def is_used_up(scene: Scene, y: F1) -> bool:
-    """Find out how far each member may still move; return whether half of it is gone for one."""
+    """Find out how far each member may still move; return whether pairs are to be listed anew."""
     broadphase, graphics = scene.broadphase, scene.graphics
     anew = False
     for row in range(graphics_awake(scene)):
@@ -483,8 +486,9 @@ def is_used_up(scene: Scene, y: F1) -> bool:
                 d += y[at + k] * reference[3 + k]
             travel += 2.0 * graphics.radius[g] * math.sqrt(max(0.0, 1.0 - d * d))
         half = half_skin(scene, g, broadphase.size[0])
+        way = max(broadphase.room[g] - (half - travel), 0.0)
         broadphase.room[g] = half - travel
-        anew = anew or travel > 0.5 * half
+        anew = anew or (travel > GONE * half and travel + AHEAD * way > half)
     return anew
 
 
