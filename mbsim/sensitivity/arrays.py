@@ -86,6 +86,9 @@ BEGINS, ENDS, WAY, FROM, LONG, IS_LATER = range(6)
 MOST_PARTS = 32
 #: Contacts that may begin or end within one step.
 MOST_CHANGES = 16
+#: Numbers of a row of `Variations.change`: the slot, at which part of the step it changes, at which
+#: with the parameter changed, how fast that time moves.
+SLOT, AT_PART, UP_PART, MOVES = range(4)
 
 
 @tags.state
@@ -147,12 +150,13 @@ class Variations(NamedTuple):
     lasted: F1  # (P,) how long such a part may be that is tried first [T]
     fifth: I1  # (P,) 1 where parts of steps of GALPHA are by the method of order 5
     shown: tags.Scratch[F2]  # (P, 2) where that is: SHOWN_AT, SHOWN_LATER
-    change: tags.Scratch[F2]  # (MOST_CHANGES, 2) slots that begin or end to touch, at which part
+    change: tags.Scratch[F2]  # (MOST_CHANGES, 4) slots that begin or end to touch, see SLOT
     row: tags.Scratch[F2]  # (4, n) of a row of results: -, y beside it, its f, its derivative
     # (4,) parts of usual steps of differences, of the least ones and of what depths allow that
     # those to one side take; and of usual ones those to both sides along a step
     one_sided: tags.Constant[F1]
     scale: tags.Constant[F1]  # (n,) usual size of a number of y
+    jumping: tags.Constant[F1]  # (n,) the same for jumps of f, also of what laws integrate
     room: tags.Constant[F1]  # (n,) by how much it may be changed for a difference
     weights: tags.Constant[F1]  # of an explicit method's stages; none where joints hold bodies
     estimates: tags.Constant[F2]  # (1 or 2, stages) of its errors, up to the one at the step's end

@@ -30,16 +30,22 @@ from mbsim.sensitivity.along import (
 from mbsim.sensitivity.arrays import (
     ALONG,
     ASKED,
+    AT_PART,
+    ATTEMPT,
     CHANGES,
+    LOST_JUMP,
     MOST_CHANGES,
+    MOVES,
     REMEMBERED,
+    SLOT,
     STEADY,
     TWIN,
     UP,
+    UP_PART,
     Variations,
 )
 from mbsim.sensitivity.branches import ANY_BRANCH, branch_of, find_change, tells
-from mbsim.sensitivity.later import add_motion, touch_later
+from mbsim.sensitivity.later import add, add_motion, touch_later
 from mbsim.sensitivity.stretches import integrate
 from mbsim.sensitivity.twin import set_parameter, step_along_motion
 
@@ -51,6 +57,15 @@ NUDGE = 1e-3
 EVERY = 4
 #: A jump of f counts if what it does to y over the step is more than this part of the usual size.
 JUMPS = 1e-13
+#: Contacts change at once where they do within this part of the step, as corners of a flat side.
+#: In a short step rounding of depths sets them apart, by this part of the straight line's length.
+AT_ONCE, ROUNDING = 1e-10, 1e-9
+#: A jump of a derivative counts from this part of usual sizes on.
+COUNTS = 1e-8
+#: So often a smaller difference is tried for the time of a change.
+TRIES = 6
+#: Row of `Variations.work`: sum of jumps.
+SUM = THIRD + 1
 
 
 @jitable
@@ -147,7 +162,7 @@ def list_changes(V: Variations, scene: Scene, t: float, h: float) -> bool:
                 continue
             if count == MOST_CHANGES:
                 return False
-            V.change[count, 0] = float(s)
+            V.change[count, SLOT] = float(s)
             count += 1
     V.words[CHANGES] = count
     return True
@@ -157,49 +172,140 @@ def list_changes(V: Variations, scene: Scene, t: float, h: float) -> bool:
 def order_changes(V: Variations, scene: Scene, t: float, h: float) -> bool:
     """Find when each listed contact changes, and order them; return whether all were found."""
     for j in range(V.words[CHANGES]):
-        when = crossing(V, scene, t, h, 0, 0.0, int(V.change[j, 0]), 0.0)
+        when = crossing(V, scene, t, h, 0, 0.0, int(V.change[j, SLOT]), 0.0)
         if not when >= 0.0:
             return False
-        slot, place = V.change[j, 0], j
-        while place > 0 and V.change[place - 1, 1] > when:
-            V.change[place, 0], V.change[place, 1] = V.change[place - 1, 0], V.change[place - 1, 1]
+        slot, place = V.change[j, SLOT], j
+        while place > 0 and V.change[place - 1, AT_PART] > when:
+            V.change[place, SLOT] = V.change[place - 1, SLOT]
+            V.change[place, AT_PART] = V.change[place - 1, AT_PART]
             place -= 1
-        V.change[place, 0], V.change[place, 1] = slot, when
+        V.change[place, SLOT], V.change[place, AT_PART] = slot, when
     return True
 
 
 @jitable
-def jump_at(V: Variations, scene: Scene, t: float, h: float, s: float) -> float:
-    """Leave by how much f falls at the part s in a row; return how much it moves in the step."""
+def nearest(t: float, h: float) -> float:
+    """Return how near to a jump f is asked for on either side, as a part of the step."""
+    return max(1e-13, 4e-16 * abs(t) / h)
+
+
+@jitable
+def jump_at(
+    V: Variations, scene: Scene, t: float, h: float, k: int, s: float, e: float, near: float
+) -> float:
+    """Leave by how much f falls at the part s in a row; return how much it moves in the step.
+
+    With parameter k changed by e, from `near` before s to as much behind it.
+    """
     twin, w, largest = view(V.words[TWIN], Scene), V.work, 0.0
     p = in_workspace(V.words[UP])[0]
-    set_parameter(V, twin, scene, 0, 0.0)
-    near = max(1e-13, 4e-16 * abs(t) / h)
+    set_parameter(V, twin, scene, k, e)
     for side in range(2):
-        at = max(s - near, 0.0) if side == 0 else min(s + near, 1.0)
+        at = s - near if side == 0 else s + near
+        if e == 0.0:
+            at = min(max(at, 0.0), 1.0)
         point_at(V, at, w[POINT])
+        if e != 0.0:
+            add(w[POINT], V.next[k], e)
         call_int(p.rhs, (p.context, t + at * h, at * h, w[POINT], w[FIRST + side]))
     for i in range(V.next.shape[1]):
         w[THIRD, i] = w[FIRST, i] - w[SECOND, i]
-        largest = max(largest, abs(w[THIRD, i]) * h / V.scale[i])
+        largest = max(largest, abs(w[THIRD, i]) * h / V.jumping[i])
     return largest
 
 
 @jitable
-def transfer(V: Variations, scene: Scene, t: float, h: float, k: int, j: int, e: float) -> int:
-    """Let the derivative jump where listed contact j changes; return a code."""
-    slot, s, w = int(V.change[j, 0]), V.change[j, 1], V.work
-    if jump_at(V, scene, t, h, s) <= JUMPS:
+def at_once(V: Variations, t: float, h: float) -> float:
+    """Return within which part of the step contacts change at once, or within rounding of it."""
+    return max(AT_ONCE, nearest(t, h), ROUNDING * V.line[0] / h)
+
+
+@jitable
+def is_first(V: Variations, t: float, h: float, j: int) -> bool:
+    """Return whether listed contact j changes later than the one before it."""
+    return j == 0 or V.change[j, AT_PART] - V.change[j - 1, AT_PART] > at_once(V, t, h)
+
+
+@jitable
+def find_moves(
+    V: Variations, scene: Scene, t: float, h: float, k: int, span: tuple[int, int], e: float
+) -> float:
+    """Find when listed contacts, from the first to the last of a span, change beside the run.
+
+    Return by how much parameter k was changed for that, 0 where it is not known: less than e where
+    they change too far from a short step.
+    """
+    for _ in range(TRIES):
+        found = True
+        for j in range(span[0], span[1] + 1):
+            slot, s = int(V.change[j, SLOT]), V.change[j, AT_PART]
+            up = crossing(V, scene, t, h, k, e, slot, s)
+            down = crossing(V, scene, t, h, k, -e, slot, s) if math.isfinite(up) else up
+            V.change[j, UP_PART], V.change[j, MOVES] = up, 0.5 / e * (up - down) * h
+            if not math.isfinite(up - down):
+                found = False
+                break
+        if found:
+            return e
+        e *= 0.1
+    return 0.0
+
+
+@jitable
+def counts(V: Variations, k: int) -> bool:
+    """Return whether the sum of jumps counts: more than `COUNTS` of usual sizes.
+
+    For a change of the parameter by its own size.
+    """
+    for i in range(len(V.jumping)):
+        if abs(V.work[SUM, i]) * V.size[k] > COUNTS * V.jumping[i]:
+            return True
+    return False
+
+
+@jitable
+def last_with(V: Variations, t: float, h: float, j: int) -> int:
+    """Return the last of the listed contacts that change at once with j, the first of them."""
+    last = j
+    while last + 1 < V.words[CHANGES] and not is_first(V, t, h, last + 1):
+        last += 1
+    return last
+
+
+@jitable
+def transfer(
+    V: Variations, scene: Scene, t: float, h: float, k: int, span: tuple[int, int], e: float
+) -> int:
+    """Let the derivative jump where listed contacts change at once, from the first to the last.
+
+    Return a code. Each of these has a jump and a time of its own. With the parameter changed by e
+    they change one after the other, or they move alike and what they jump by is shared.
+    """
+    (j, last), near, total = span, nearest(t, h), V.work[SUM]
+    first, wide = V.change[j, AT_PART], V.change[last, AT_PART] - V.change[j, AT_PART]
+    if jump_at(V, scene, t, h, k, first, 0.0, near + wide) <= JUMPS:
         return 0
-    up = crossing(V, scene, t, h, k, e, slot, s)
-    down = crossing(V, scene, t, h, k, -e, slot, s)
-    if not math.isfinite(up - down):
+    e = find_moves(V, scene, t, h, k, (j, last), e)
+    if e == 0.0:
         return Code.NOT_CONVERGED
-    # the rows were used meanwhile
-    jump_at(V, scene, t, h, s)
-    shift = 0.5 / e * (up - down) * h
-    for i in range(V.next.shape[1]):
-        V.next[k, i] += w[THIRD, i] * shift
+    total[:] = 0.0
+    for one in range(j, last + 1):
+        share = 0
+        for other in range(j, last + 1):
+            apart = abs(V.change[other, UP_PART] - V.change[one, UP_PART])
+            share += 1 if apart <= at_once(V, t, h) else 0
+        if last > j:
+            jump_at(V, scene, t, h, k, V.change[one, UP_PART], e, at_once(V, t, h))
+        else:
+            # the rows were used meanwhile
+            jump_at(V, scene, t, h, k, first, 0.0, near)
+        add(total, V.work[THIRD], V.change[one, MOVES] / share)
+    add(V.next[k], total, 1.0)
+    # the polynomial of an implicit step, or of one in which friction begins to stretch, does not
+    # tell well enough what is behind such a jump; nor is one of several at once known well enough
+    if (V.words[REMEMBERED] > 0 or V.words[ATTEMPT] == 0 or last > j) and counts(V, k):
+        V.reason[k] = LOST_JUMP
     return 0
 
 
@@ -217,18 +323,24 @@ def is_bent(V: Variations, scene: Scene) -> bool:
 def pass_change(
     V: Variations, scene: Scene, t: float, h: float, k: int, j: int, later: float, e: float
 ) -> tuple[int, float]:
-    """Carry the derivative in `next` across listed contact j; return a code, and how much later.
+    """Carry the derivative in `next` across listed contact j, and those at once with it.
 
+    Return a code, and how much later.
     What is carried is D + s f, with the s that is given up to there and the one that is returned
     from there on.
     """
-    code, slot = transfer(V, scene, t, h, k, j, e), int(V.change[j, 0])
+    last = last_with(V, t, h, j)
+    slot, code = int(V.change[last, SLOT]), transfer(V, scene, t, h, k, (j, last), e)
     if code != 0 or V.words[STEADY] != 1 or scene.work.touching[slot] == 0:
         return code, later
-    s = touch_later(V, scene, t, h, k, slot, V.change[j, 1], e)
+    at = V.change[last, AT_PART]
+    s = touch_later(V, scene, t, h, k, slot, at, e)
     if not abs(s) < math.inf:
         return 0, later
-    return add_motion(V, scene, t, h, V.change[j, 1], k, s - later), s
+    if last > j:
+        # where all of them touch
+        at = min(at + at_once(V, t, h), 1.0)
+    return add_motion(V, scene, t, h, at, k, s - later), s
 
 
 @jitable
@@ -281,9 +393,11 @@ def step_along(
         for i in range(V.next.shape[1]):
             V.work[FIRST, i] = V.slope[k, i]
     for j in range(V.words[CHANGES]):
-        end, begins = V.change[j, 1], scene.work.touching[int(V.change[j, 0])] == 1
+        end, begins = V.change[j, AT_PART], scene.work.touching[int(V.change[j, SLOT])] == 1
         if end > until:
             break
+        if not is_first(V, t, h, j):
+            continue
         if end <= span[0] and span[0] > 0.0:
             continue
         stretch = (begin, end, touched, not begins)

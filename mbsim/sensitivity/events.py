@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.codes import SLIDES
 from mbsim.arrays.scene import Scene
 from mbsim.core.address import call_int, view
 from mbsim.core.arrays import F1
@@ -53,7 +54,7 @@ from mbsim.sensitivity.arrays import (
     Variations,
 )
 from mbsim.sensitivity.branches import ANY_BRANCH, branch_of
-from mbsim.sensitivity.changes import crossing, jump_at
+from mbsim.sensitivity.changes import crossing, jump_at, nearest
 from mbsim.sensitivity.twin import half_step, is_asked, keep_change, keep_side, set_parameter
 
 #: Times of changes are looked for along a straight line as long as this part of the problem's own
@@ -154,7 +155,8 @@ def note_jump(V: Variations, scene: Scene, t: float, H: float) -> None:
     if abs(s) < math.inf:
         for i in range(len(V.scale)):
             usual = max(usual, abs(V.jump[F_BEFORE, i]) / V.scale[i])
-        V.words[JUMPS] = 1 if jump_at(V, scene, t - H, H, s) > JUMP * usual * H else 0
+        jump = jump_at(V, scene, t - H, H, 0, s, 0.0, nearest(t - H, H))
+        V.words[JUMPS] = 1 if jump > JUMP * usual * H else 0
 
 
 @jitable
@@ -360,6 +362,16 @@ def changes_unasked(V: Variations, scene: Scene) -> bool:
 
 
 @jitable
+def sticks(scene: Scene) -> bool:
+    """Return whether dry friction of an element sticks, by a spring from where its slider is."""
+    for f in range(len(scene.applied.keeps)):
+        held = scene.applied.equation[f] >= 0
+        if scene.applied.keeps[f] == 1 and not held and scene.state.dry[f, SLIDES] == 0.0:
+            return True
+    return False
+
+
+@jitable
 def cross(V: Variations, scene: Scene, t: float, y: F1, switched: bool) -> None:
     """Let all derivatives in `next` jump with what a commit has changed; y is behind it.
 
@@ -382,6 +394,9 @@ def cross(V: Variations, scene: Scene, t: float, y: F1, switched: bool) -> None:
             if V.shift[k, last] != 0.0:
                 V.reason[k] = LOST_JUMP
     unseen = V.words[REMEMBERED] > 0 and switched and changes_unasked(V, scene)
+    # where sliders of elements stand moves with a parameter, and is no number of y
+    if switched and V.asks[last] == 0 and sticks(scene):
+        V.reason[:] = LOST_JUMP
     for k in range(len(V.size)):
         for i in range(n):
             if y[i] != V.jump[BEFORE, i] and y[i] == 0.0:

@@ -217,11 +217,11 @@ class Sensitivities:
             parts=np.zeros(count, dtype=np.int64),
             wide=np.zeros(count),
             lasted=np.zeros(count),
-            shown=np.zeros((count, 2)),
-            change=np.zeros((at.MOST_CHANGES, 2)),
+            change=np.zeros((at.MOST_CHANGES, 4)),
             row=np.zeros((4, n)),
             one_sided=_one_sided(self.system),
             scale=_scale(self.system, n),
+            jumping=_scale(self.system, n, jumping=True),
             room=_scale(self.system, n) * _steps(self.system, n),
             weights=np.zeros(0),
             estimates=np.zeros((1, 0)),
@@ -392,10 +392,11 @@ class Sensitivities:
 
 
 def _of_jumps(count: int, n: int) -> dict[str, Any]:
-    """Return the arrays of `timed`, for so many parameters and numbers of y, and `_FLAGS`."""
+    """Return arrays of `timed` and of rows, for so many parameters and numbers of y; `_FLAGS`."""
     return {name: np.zeros(count, dtype=np.int64) for name in _FLAGS} | {
         "gap": np.full(3, math.nan),
         "moves": np.zeros((count, 2)),
+        "shown": np.zeros((count, 2)),
         "shrink": np.ones(count),
         "fall": np.zeros((count, n)),
         "sides": np.zeros((SIDES, n)),
@@ -465,8 +466,11 @@ def _weights(running: scheme.Scheme) -> Array:
     return np.array((dopri5.B1, 0.0, dopri5.B3, dopri5.B4, dopri5.B5, dopri5.B6))
 
 
-def _scale(system: System, n: int) -> Array:
-    """Return the usual size of every number of y; of what only sums up none is needed."""
+def _scale(system: System, n: int, jumping: bool = False) -> Array:
+    """Return the usual size of every number of y; of what only sums up none is needed.
+
+    What laws integrate counts for jumps of f alone: a bristle's stretch grows from the touch on.
+    """
     scale = system.scene.world.scale
     length, speed = float(scale[SCALE_LENGTH]), float(scale[SCALE_SPEED])
     of_a_body = [length] * 3 + [0.5] * 4 + [speed] * 3 + [speed / length] * 3
@@ -475,9 +479,9 @@ def _scale(system: System, n: int) -> Array:
     states = np.asarray(system.scene.states.offset, dtype=np.int64)
     found[states] = np.maximum(system.scene.states.scale, 1e-300)
     # what friction carries is a stretch or a way over one, and follows the slip as exactly
-    places = system.scene.slots.x
-    for s in np.flatnonzero(places >= 0):
-        found[places[s] : places[s] + 2] = length
+    for places in (system.scene.slots.x, system.scene.slots.z)[: 2 if jumping else 1]:
+        for first in places[places >= 0]:
+            found[first : first + 2] = length
     return found
 
 
