@@ -99,6 +99,19 @@ def matrix_from_quaternion(q: F1, R: F2) -> None:
 
 
 @jitable
+def vector_of_turn(q: V4, q0: F1) -> V3:
+    """Return the vector part of q q0*: along the axis of the turn from q0 to q, sin(half) long.
+
+    It is exact to rounding for the smallest turns, of which q.q0 is 1.
+    """
+    return (
+        -q[0] * q0[1] + q[1] * q0[0] - q[2] * q0[3] + q[3] * q0[2],
+        -q[0] * q0[2] + q[1] * q0[3] + q[2] * q0[0] - q[3] * q0[1],
+        -q[0] * q0[3] - q[1] * q0[2] + q[2] * q0[1] + q[3] * q0[0],
+    )
+
+
+@jitable
 def turn_about(q: V4, q0: F1, w: V3, w0: V3, n: V3, n0: V3, h: float) -> float:
     """Return the angle by which a body turned about a unit vector on its way: the integral of w.n.
 
@@ -107,11 +120,7 @@ def turn_about(q: V4, q0: F1, w: V3, w0: V3, n: V3, n0: V3, h: float) -> float:
     product with n counts what both change together. The error is h^5 where n stays, else h^3.
     """
     c = q[0] * q0[0] + q[1] * q0[1] + q[2] * q0[2] + q[3] * q0[3]
-    r = (
-        -q[0] * q0[1] + q[1] * q0[0] - q[2] * q0[3] + q[3] * q0[2],
-        -q[0] * q0[2] + q[1] * q0[3] + q[2] * q0[0] - q[3] * q0[1],
-        -q[0] * q0[3] - q[1] * q0[2] + q[2] * q0[1] + q[3] * q0[0],
-    )
+    r = vector_of_turn(q, q0)
     if c < 0.0:
         r, c = scale(-1.0, r), -c
     s = norm(r)

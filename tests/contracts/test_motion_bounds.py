@@ -7,6 +7,8 @@ import pytest
 
 from helpers.pairs import random_rotation
 from helpers.surfaces import Meshed, box
+from mbsim.core.layout import AT_Q, BODY_SIZE
+from mbsim.dynamics.bodies.kinematics import turn_travel
 from mbsim.geometry.mesh.motion import ball_time, mesh_time
 from mbsim.geometry.motion import (
     ACCELERATION,
@@ -94,3 +96,26 @@ def test_no_corner_goes_deeper_than_allowed_before_its_time():
             hit += 1
             assert (turned[:, 2] + z + v[2] * time).min() > 0.01 - allowed * (1.0 + 1e-9)
     assert hit > 30
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 3e-9, 1e-7, 1e-3, 1.0, 3.0])
+def test_the_smallest_turn_counts(angle):
+    """The bound of a turn is how far the farthest point goes, of the smallest turns as well."""
+    rng = np.random.default_rng(5)
+    before = rng.normal(size=4)
+    before /= np.linalg.norm(before)
+    axis = rng.normal(size=3)
+    axis /= np.linalg.norm(axis)
+    w, x, y, z = before
+    c, (a, b, d) = np.cos(angle / 2), np.sin(angle / 2) * axis
+    turned = [
+        c * w - a * x - b * y - d * z,
+        c * x + a * w + b * z - d * y,
+        c * y + b * w + d * x - a * z,
+        c * z + d * w + a * y - b * x,
+    ]
+    for length in (1.0, 1.2):
+        state = np.zeros(2 * BODY_SIZE)
+        state[BODY_SIZE + AT_Q : BODY_SIZE + AT_Q + 4] = length * np.array(turned)
+        travel = turn_travel(state, 1, before, 0.3)
+        assert travel == pytest.approx(0.6 * np.sin(angle / 2), rel=1e-6, abs=1e-15)

@@ -247,3 +247,11 @@ def test_table_is_what_its_command_gives(deck):
     else:
         exact = run(deck, integrator="DOP853", tol=1e-10)[1]
     assert np.abs(exact - stiff.table(deck)[1]).max() < 1e-3 * deck.size
+
+
+@pytest.mark.parametrize("method", ["DOPRI5", "DOP853"])
+def test_boxes_that_a_loose_tol_shakes_are_met_as_they_turn(method):
+    """Steps of a microsecond turn a box by 1e-8 rad: a corner that comes down by that touches."""
+    model = mbsim.read_model(MODELS / "stiff" / "box_stack.xml")
+    with mbsim.simulate(model, integrator=method, tol=1e-2, end_time=0.05) as results:
+        assert results["time"][-1] == pytest.approx(0.05)

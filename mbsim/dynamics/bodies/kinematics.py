@@ -8,7 +8,15 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import AT_Q, AT_V, AT_W, BODY_SIZE
-from mbsim.core.rotation import dot, matrix_from_quaternion, norm, rotate, sub, vector
+from mbsim.core.rotation import (
+    dot,
+    matrix_from_quaternion,
+    norm,
+    rotate,
+    sub,
+    vector,
+    vector_of_turn,
+)
 from mbsim.dynamics.bodies.awake import bodies_awake, body_awake, graphic_awake, graphics_awake
 
 
@@ -79,12 +87,23 @@ def plane_travel(scene: Scene, g: int) -> float:
 
 
 @jitable
+def turn_travel(y: F1, b: int, before: F1, radius: float) -> float:
+    """Return how far a turn by angle a since the unit quaternion `before` moves body b's points.
+
+    Those at a radius r by at most 2 r sin(a/2).
+    """
+    at = BODY_SIZE * b + AT_Q
+    q = (y[at], y[at + 1], y[at + 2], y[at + 3])
+    length = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    return 2.0 * radius * norm(vector_of_turn(q, before)) / length
+
+
+@jitable
 def place_graphics(scene: Scene, y: F1) -> bool:
     """Place every shape that does not sleep, and bound how far any of its points has come.
 
-    Since the committed state the centre moved by |dx|, and a turn by angle a moves points at
-    radius r by at most 2 r sin(a/2), cos(a/2) = |q.q0|. Return whether all shapes are where
-    the list of near pairs still holds.
+    Since the committed state the centre moved by |dx|, and a turn moves points besides. Return
+    whether all shapes are where the list of near pairs still holds.
     """
     graphics, work, state = scene.graphics, scene.work, scene.state
     listed, skin = True, scene.broadphase.size[0]
@@ -100,12 +119,7 @@ def place_graphics(scene: Scene, y: F1) -> bool:
             dx, dy, dz = frame[0] - centre[0], frame[1] - centre[1], frame[2] - centre[2]
             travel = math.sqrt(dx * dx + dy * dy + dz * dz)
             if graphics.turns[g] == 1:
-                at, before = BODY_SIZE * b + AT_Q, state.q[b]
-                d, qq = 0.0, 0.0
-                for k in range(4):
-                    d += y[at + k] * before[k]
-                    qq += y[at + k] * y[at + k]
-                travel += 2.0 * graphics.radius[g] * math.sqrt(max(0.0, 1.0 - d * d / qq))
+                travel += turn_travel(y, b, state.q[b], graphics.radius[g])
         work.travel[g] = travel
         room = scene.broadphase.room[g]
         if travel < math.inf:

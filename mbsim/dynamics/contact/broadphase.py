@@ -37,7 +37,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.core.rotation import norm, sub, vector
 from mbsim.dynamics.bodies.awake import graphic_awake, graphics_awake
-from mbsim.dynamics.bodies.kinematics import half_skin, plane_travel
+from mbsim.dynamics.bodies.kinematics import half_skin, plane_travel, turn_travel
 from mbsim.dynamics.contact.detection import measure_pair
 from mbsim.dynamics.contact.memory import put_aside
 
@@ -481,10 +481,7 @@ def is_used_up(scene: Scene, y: F1) -> bool:
         if math.isinf(graphics.radius[g]):
             travel = plane_travel(scene, g)
         elif graphics.turns[g] == 1:
-            at, d = BODY_SIZE * b + 3, 0.0
-            for k in range(4):
-                d += y[at + k] * reference[3 + k]
-            travel += 2.0 * graphics.radius[g] * math.sqrt(max(0.0, 1.0 - d * d))
+            travel += turn_travel(y, b, reference[3:], graphics.radius[g])
         half = half_skin(scene, g, broadphase.size[0])
         way = max(broadphase.room[g] - (half - travel), 0.0)
         broadphase.room[g] = half - travel
