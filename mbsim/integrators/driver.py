@@ -99,6 +99,10 @@ from mbsim.integrators.scheme import (
     parts,
 )
 
+#: Implicit steps that end at a touch may be the shorter the looser the tolerance is, down to
+#: LOCATED from here on: what positions are rounded by makes an error of their velocities that grows
+#: as steps get shorter, and one above the tolerance is above it in any shorter step too.
+SHARP = 1e-7
 #: Where steps are cut one after another, whole ones grow so much at most.
 CUT_GROW = 2.0
 #: A hook that fails is tried again at a tenth of the step, so many times; one whose numbers are
@@ -181,7 +185,8 @@ def length(
             limit, behind = -limit, h
         if steps.implicit:
             # in a shorter one velocities are rounding errors of positions over h
-            limit = max(limit, LOCATED * max(m.memory[OWN_TIME], abs(t)))
+            own = m.memory[OWN_TIME] * max(1.0, SHARP / m.memory[TOL])
+            limit = max(limit, LOCATED * max(own, abs(t)))
         h = min(h, limit)
     h = max(h, floor)
     # no sliver of a step before the end

@@ -34,10 +34,12 @@ from mbsim.integrators.newton import (
     SOLVED,
     as_failure,
     begin,
+    is_at_rounding,
     is_good_enough,
     judge,
     linearise,
     may_help,
+    nears_rounding,
     unless_singular,
     with_ease,
 )
@@ -213,8 +215,7 @@ def unsolved(m: Method, h: float, f: int, i: int) -> float:
 @jitable
 def correct(p: Problem, m: Method, t: float, h: float) -> tuple[int, float]:
     """Correct the stages once; return a code, and the largest correction in the error's norm."""
-    k = m.k
-    n = len(m.y)
+    k, n = m.k, len(m.y)
     g, re, im = G0 / h, G_RE / h, G_IM / h
     real, pair, d, dd = k[REAL], k[PAIR : PAIR + 2], k[REAL_D], k[PAIR_D : PAIR_D + 2]
     for i in range(n):
@@ -268,6 +269,7 @@ def iterate(p: Problem, m: Method, t: float, h: float, anew: bool) -> int:
                 m.error[i] = 0.0
             project_stage(p, m, t, h, j)
         transform(m)
+    own = anew or m.memory[JACOBIAN_TIME] == linearised_at(m, t, h)
     before, rate, slowest, word, iteration = 0.0, 0.0, 0.0, GO_ON, 0
     while word == GO_ON:
         iteration += 1
@@ -282,13 +284,15 @@ def iterate(p: Problem, m: Method, t: float, h: float, anew: bool) -> int:
             slowest = rate
             if word == HOPELESS and size < SECOND * before:
                 word, rate = GO_ON, 0.0
-        elif iteration > 2 and (size < HALF * before or size > LEFT * m.memory[TOL]):
+        elif word == HOPELESS and own and iteration < MOST and nears_rounding(size, before):
+            word = GO_ON
+        if iteration > 2 and (size < HALF * before or size > LEFT * m.memory[TOL]):
             # else rounding, which is the same at any step
             slowest = max(size / before, slowest if iteration > 3 else 0.0)
         before = size
     m.memory[RATE] = rate
     m.memory[GROWTH] = max(1.0, GOOD_RATE / slowest) if slowest > 0.0 else math.inf
-    if word == HOPELESS and (anew or m.memory[JACOBIAN_TIME] == linearised_at(m, t, h)):
+    if word == HOPELESS and own:
         return 0 if is_good_enough(p, m, t, h, before, rate) else -1
     return 0 if word == SOLVED else -1
 
@@ -430,10 +434,7 @@ def arrive(p: Problem, m: Method, t: float, h: float) -> int:
 
 @jitable
 def solve_anew(p: Problem, m: Method, t: float, h: float) -> int:
-    """Solve for the stages, from where they are, with a linearisation at the trial point.
-
-    Returns a code.
-    """
+    """Solve for the stages, from where they are, linearised at the trial point; return a code."""
     code = linearise(p, m, t + h, h, m.trial, m.k[LAST])
     if code == 0:
         code = factor(p, m, t, h)
@@ -456,7 +457,7 @@ def attempt(p: Problem, m: Method, t: float, h: float) -> int:
         code = arrive(p, m, t, h)
         if code != 0 or not m.memory[LAST_ERROR] <= 1.0:
             return code
-        if anew == MOST_ANEW or not is_off(p, m, t, h):
+        if anew == MOST_ANEW or (anew > 0 and is_at_rounding(m)) or not is_off(p, m, t, h):
             keep_polynomial(m)
             return 0
         anew += 1

@@ -255,3 +255,19 @@ def test_boxes_that_a_loose_tol_shakes_are_met_as_they_turn(method):
     model = mbsim.read_model(MODELS / "stiff" / "box_stack.xml")
     with mbsim.simulate(model, integrator=method, tol=1e-2, end_time=0.05) as results:
         assert results["time"][-1] == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize("method", ["RADAU5", None], ids=["RADAU5", "AUTO"])
+def test_rounding_of_a_stiff_stop_does_not_shorten_steps(method):
+    """A depth is rounded by 1e-17 m: at 1e10 N/m that moves velocities by 1e-10 of their scale.
+
+    A tenth of the tolerance takes a few times the evaluations, not fifty times.
+    """
+    model, work = mbsim.read_model(MODELS / "stiff" / "preloaded_stop.xml"), []
+    _, exact = stiff.table(named("preloaded_stop"))
+    for tol in (1e-8, 1e-9):
+        with mbsim.simulate(model, integrator=method, tol=tol) as results:
+            work.append(results.stats["rhs_evaluations"])
+            off = results["bodies/2/position"][:, 0] - exact[:, 0]
+        assert np.abs(off).max() < 0.1 * tol
+    assert work[1] < 8 * work[0]
