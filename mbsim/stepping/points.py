@@ -52,10 +52,16 @@ def way_at(scene: Scene, S: Stepping, g: int, h: float, radius: float) -> float:
 
 @jitable
 def fill_reach(scene: Scene, S: Stepping, h: float) -> None:
-    """Bound how far any point of a graphic may come in a step, by its body's velocities."""
+    """Bound how far any point of a graphic may come in a step, by its body's velocities.
+
+    No less than what the solver may leave of a way: what rests a little above a surface is held by
+    it in very short steps too.
+    """
     for k in range(graphics_awake(scene)):
         g = graphic_awake(scene, k)
-        S.motion.reach[g] = way_at(scene, S, g, h, scene.graphics.radius[g])
+        b = scene.graphics.body[g]
+        least = S.plan.scale[S.plan.connected[b], LEFT] if b < len(S.rest.body) else 0.0
+        S.motion.reach[g] = max(way_at(scene, S, g, h, scene.graphics.radius[g]), least)
 
 
 @jitable

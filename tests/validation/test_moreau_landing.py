@@ -288,3 +288,14 @@ def test_a_torus_that_has_rolled_on_its_rim_lies_flat(tmp_path, h, tol) -> None:
     results = mbsim.simulate(mbsim.read_model(path), integrator="MOREAU", tol=tol)
     assert tilt(results, 2) < 5e-5
     assert results["bodies/2/position"][-1, 2] == pytest.approx(p.S9.tube, abs=5e-6)
+
+
+@pytest.mark.parametrize("end", [1.1990, 1.1995, 1.2, 1.2005])
+def test_what_rests_holds_in_very_short_steps(tmp_path, end) -> None:
+    """It rests a micrometre above the floor, and was let go in a step shorter than that falls.
+
+    Nothing was known of what carries it in the next step, and a ball that lands then went through.
+    """
+    parts = [ball("ellipsoid", 0.05, EDGE + 0.05 + 0.3), base("cylinder")]
+    results = run(tmp_path, parts, 200.0, None, end, 1e-3)
+    assert results.audit.entries["energy"].value < ALLOWED["cylinder"][0]
