@@ -138,6 +138,8 @@ class Motion(NamedTuple):
     known: I1  # (1,) 1 where that is known of bodies that joints or forces hold, or is nothing
     flight: F2  # (nb + 1, 6) at the step's end, if nothing but these contacts presses
     v: F2  # (nb + 1, 6) with them
+    still: I1  # (1,) points of islands that go nowhere
+    costs: F1  # (2,) points that press, and seconds of Newton's iteration with as many, `solver`
     guess: F2  # (nb, 6) as the last solution of the step had it, by which forces are
     full: F2  # (nb + 1, 6) with all rebound, see `rebound`
     work: F2  # (nb, 4) of contacts of the island of which a body is the first
@@ -407,6 +409,8 @@ def make(
         loaded=whole(held),
         listed=whole(held),
         batch=whole(AT_ONCE // 3),
+        still=whole(1),
+        costs=numbers(2),
         middle=numbers(ny),
         midst=numbers(ny),
         aside=numbers(ny),

@@ -14,7 +14,7 @@ from mbsim.stepping.arrays import LEFT, LEFT_SPEED, LENGTH, NOISE, SPEED, Steppi
 #: most, however short a step.
 NOISE_OF_SPEED = 30.0
 #: What stands still is solved so many times closer, but not below this part of its group's speed.
-CLOSER, ROUNDING = 0.01, 1e-11
+CLOSER, ROUNDING = 0.001, 1e-11
 
 
 @jitable

@@ -20,6 +20,7 @@ import numpy as np
 
 from mbsim.core.arrays import F2, I1
 from mbsim.core.jitable import jitable
+from mbsim.fclib.bodies.factors import newton_work
 from mbsim.fclib.bodies.solve import solve_contacts
 from mbsim.stepping.arrays import ALONG, W_NN, W_XX, W_ZZ, Motion, Points
 from mbsim.stepping.one_point import (
@@ -39,18 +40,26 @@ LOOKS = 8
 #: What impacts may leave at most, over what the solver may leave where nothing meets.
 MOST_LEFT = 10.0
 #: What sweeps change falls by a rate from one to the next, which is taken for less than the
-#: largest; what is left then may be so many times what may be left. A change below the least part
-#: of that is no sign of a rate.
-LARGEST_RATE, SLACK, EASY = 0.99, 10.0, 0.05
+#: largest: in a column of n bodies it is 1 - 1/n^2. What is left then may be so many times what may
+#: be left; so many where Newton's method finishes.
+LARGEST_RATE, SLACK, SLACK_OF_FEW = 0.99, 10.0, 3.0
+#: The largest rate where this part of the points is of what goes nowhere: it sleeps by that.
+RATE_AT_REST, MOST_STILL = 0.9999, 0.9
 #: How often the points of a pair are solved in one sweep at most.
 MOST_ROUNDS = 5
 #: A single point may be left so many times worse than the mean of them.
 WORST = 5.0
 #: A velocity that changes by less than this part of what may be left asks no other pair.
 STILL = 0.25
-#: Points that press up to which Newton's method finishes: of large piles a step's factors cost more
-#: than sweeps bring, and warm starts go on from step to step.
-NEWTON_POINTS = 300
+#: Points that press up to which Newton's method finishes in any case, and sweeps that an iteration
+#: of it takes at most where more do, or part of those that were taken. In columns it takes 8, in
+#: walls 12, in heaps 15 to 30; warm starts go on from step to step.
+NEWTON_POINTS, MANY_SWEEPS, OF_SWEEPS = 300, 9.0, 0.1
+#: The same at rest.
+SWEEPS_AT_REST = 14.0
+#: Seconds that a sweep takes for a point, as `fclib.factor.factor_work` counts; up to so many times
+#: as many points an iteration is taken to cost as before.
+SWEEP_WORK, ALIKE = 1e-7, 1.1
 #: Newton iterations of a step at most, and the smallest error that they go for.
 NEWTONS, SHARPEST = 40, 1e-13
 
@@ -193,22 +202,30 @@ def go_on(p: Points, M: Motion, count: int, part: float, number: int) -> None:
 
 
 @jitable
-def what_follows(square: float, before: float) -> float:
+def rests(M: Motion, count: int) -> bool:
+    """Return whether most points are of what goes nowhere."""
+    return M.still[0] >= MOST_STILL * count
+
+
+@jitable
+def what_follows(square: float, before: float, largest: float) -> float:
     """Return what all sweeps to come change, over what the last one did: 1 / (1/rate - 1).
 
     The last one changed `square`, and the one before it `before`: rate^2 of that. In stacks the
     rate is near 1, and what a sweep still changes says little.
     """
     rate = math.sqrt(square / before) if 0.0 < before else 1.0
-    rate = min(rate, LARGEST_RATE)
+    rate = min(rate, largest)
     return rate / (1.0 - rate)
 
 
 @jitable
 def sweep_on(
     p: Points, M: Motion, count: int, may: tuple[float, float], most: int, newton: bool
-) -> tuple[float, int, bool]:
+) -> tuple[float, int, bool, bool]:
     """Improve r and v of `count` points; return what a sweep still changes, sweeps, if solved.
+
+    And whether it is solved but for what sweeps to come would change.
 
     That is of a velocity, over what may be left of it, `least` of its point: `may` is a factor of
     that, and the part of jumps. Sweeps end where one of all pairs changes less than 1 in the square
@@ -221,6 +238,8 @@ def sweep_on(
     interactive contact force problems, The Visual Computer 26 (2010) 893.
     """
     left, before, sweeps, whole, solved, first = 0.0, 0.0, 0, True, True, most
+    slow, slack = False, SLACK_OF_FEW if newton else SLACK
+    rate = RATE_AT_REST if rests(M, count) else LARGEST_RATE
     for k in range(count):
         p.counts[k] = 1.0 / (may[0] * p.least[k])
         for a in range(3):
@@ -234,8 +253,10 @@ def sweep_on(
         solved = left <= 1.0 or (left <= WORST and mean <= 1.0)
         square = gradient(p, count)
         first = min(first, sweeps) if solved else most
-        if solved and left > EASY and (newton or sweeps < 2 * first):
-            solved = sweeps > 1 and mean * what_follows(square, before) <= SLACK
+        # a smaller change is no sign of a rate
+        slow = solved and left > 0.5 * slack * (1.0 - rate)
+        slow = slow and (sweeps == 1 or mean * what_follows(square, before, rate) > slack)
+        solved = solved and not (slow and (newton or sweeps < 2 * first))
         if (solved and whole) or sweeps == most or not math.isfinite(left):
             break
         whole = solved or sweeps == most - 1
@@ -248,7 +269,7 @@ def sweep_on(
         before = square
         if whole:
             change_all(p, M.changed, count, sweeps)
-    return left, sweeps, solved
+    return left, sweeps, solved, slow
 
 
 @jitable
@@ -284,7 +305,7 @@ def finish(p: Points, M: Motion, ground: int, closed: I1, sharp: float) -> int:
         w[row, 0] += p.ahead[k]
         for a in range(3):
             size += w[row, a] ** 2
-    tol = min(max(0.05 * allowed / max(math.sqrt(size), 1e-300), SHARPEST), 1e-3)
+    tol = min(max(0.001 * allowed / max(math.sqrt(size), 1e-300), SHARPEST), 1e-3)
     found = solve_contacts(M.inverse, bodies, H, mu, w, r, tol, 0, NEWTONS)
     for row in range(count):
         if not math.isfinite(r[row, 0] + r[row, 1] + r[row, 2]):
@@ -317,6 +338,35 @@ def some_wide(p: Points, count: int) -> bool:
 
 
 @jitable
+def cost_of(p: Points, M: Motion, ground: int, closed: I1) -> float:
+    """Return the estimated seconds of one of Newton's iterations; kept, as it takes a part of one.
+
+    Of points that press: about as many cost as much from one step to the next.
+    """
+    count = len(closed)
+    known = M.costs[0]
+    if not (count <= ALIKE * known and known <= ALIKE * count):
+        bodies = np.empty((count, 2), dtype=np.int64)
+        for row in range(count):
+            for side in range(2):
+                b = p.body[closed[row], side]
+                bodies[row, side] = -1 if b == ground else b
+        M.costs[0], M.costs[1] = count, newton_work(bodies, ground)
+    return M.costs[1]
+
+
+@jitable
+def is_costly(p: Points, M: Motion, ground: int, closed: I1, rest: bool, sweeps: int) -> bool:
+    """Return whether Newton's method costs more than it brings, by the sweeps that were taken.
+
+    `rest`: see `rests`.
+    """
+    many = SWEEPS_AT_REST if rest else MANY_SWEEPS
+    most = max(many, OF_SWEEPS * sweeps) * SWEEP_WORK * len(closed)
+    return cost_of(p, M, ground, closed) > most
+
+
+@jitable
 def solve_points(
     p: Points, M: Motion, ground: int, count: int, may: tuple[float, float]
 ) -> tuple[float, int, int, bool]:
@@ -326,18 +376,27 @@ def solve_points(
     where little changed; Newton's method does what they leave, and sweeps what it leaves.
     """
     most = FEW_SWEEPS if count <= FEW_POINTS else MOST_SWEEPS
-    newton = pressing(p, count) <= NEWTON_POINTS and not some_wide(p, count)
-    left, sweeps, solved = sweep_on(p, M, count, may, most, newton)
-    if solved:
+    wide, newtons, rest = some_wide(p, count), 0, rests(M, count)
+    newton = pressing(p, count) <= NEWTON_POINTS and not wide and not rest
+    left, sweeps, solved, slow = sweep_on(p, M, count, may, most, newton)
+    if solved and (wide or not slow):
         return left, sweeps, 0, solved
-    newtons = 0
     if not math.isfinite(left):
         begin_anew(p, M, count)
-    elif not some_wide(p, count):
+    elif not wide:
         closed = list_closed(p, M, count)
-        if 0 < len(closed) <= NEWTON_POINTS:
+        if solved and is_costly(p, M, ground, closed, rest, sweeps):
+            if len(closed) > NEWTON_POINTS:
+                return left, sweeps, 0, solved
+            left, more, solved, _ = sweep_on(p, M, count, may, most, True)
+            sweeps += more
+            if solved:
+                return left, sweeps, 0, solved
+            closed = list_closed(p, M, count)
+        few = len(closed) <= NEWTON_POINTS
+        if len(closed) > 0 and (few or not is_costly(p, M, ground, closed, rest, sweeps)):
             newtons = finish(p, M, ground, closed, may[0])
-    left, more, solved = sweep_on(p, M, count, may, MOST_SWEEPS, False)
+    left, more, solved, _ = sweep_on(p, M, count, may, MOST_SWEEPS, False)
     if not math.isfinite(left):
         begin_anew(p, M, count)
         change_all(p, M.changed, count, 0)

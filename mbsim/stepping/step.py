@@ -172,6 +172,7 @@ def prepare_points(scene: Scene, S: Stepping, h: float) -> int:
         begin += P.many[k] if P.wide[k] >= 0 else 0
     fill_answers(scene, S)
     recall(S, h)
+    M.still[0] = 0
     if count > 0:
         find_still(scene, S, h)
     for k in range(count):
@@ -181,6 +182,7 @@ def prepare_points(scene: Scene, S: Stepping, h: float) -> int:
         P.speed[k], P.least[k] = S.plan.scale[g, SPEED], left_of(S, g, h)
         if is_still(S, k):
             P.least[k] = left_at_rest(S, g, h)
+            M.still[0] += 1
         if row >= 0 and slip <= noise_of(S, g, h):
             # what stuck moves by what the solver left of it
             slip = 0.0 if S.kept.table[row, KEPT_STICKS] == 1.0 else slip

@@ -12,7 +12,14 @@ import numpy as np
 
 from mbsim.core.jitable import jitable
 from mbsim.fclib.bodies.system import SIX, velocities_by
-from mbsim.fclib.factor import Factors, factorise, room_for_factors, solve, transposed_places
+from mbsim.fclib.factor import (
+    Factors,
+    factor_work,
+    factorise,
+    room_for_factors,
+    solve,
+    transposed_places,
+)
 from mbsim.fclib.ordering import Analysis, analyse, elimination_flops
 
 if TYPE_CHECKING:
@@ -37,8 +44,8 @@ class BodyMatrix(NamedTuple):
         The matrix in blocks; `back` by `factor.transposed_places`.
     place
         (nc, 2, 2) the block of each pair of a contact's bodies, -1: none.
-    analysis, flops, factors
-        Its fronts, the operations of a factorisation, and the factors.
+    analysis, factors
+        Its fronts and its factors.
     x
         (6 nodes,) a right side and its solution.
     """
@@ -51,7 +58,6 @@ class BodyMatrix(NamedTuple):
     val: Vector
     place: Indices
     analysis: Analysis
-    flops: float
     factors: Factors
     x: Vector
 
@@ -119,9 +125,8 @@ def _places(bodies: Indices, held: Flags, number: Indices, ptr: Indices, col: In
 
 
 @jitable
-def body_matrix(system: BodySystem, count: int, held: Flags) -> BodyMatrix:
-    """Return the matrix of contacts `held` of `count` bodies, analysed, with room for factors."""
-    bodies = system.bodies
+def _numbered(bodies: Indices, count: int, held: Flags) -> tuple[int, Indices]:
+    """Return how many of `count` bodies contacts `held` move, and each body's node, else -1."""
     number = np.full(count, np.int32(-1))
     for a in range(len(bodies)):
         for side in range(2):
@@ -132,14 +137,39 @@ def body_matrix(system: BodySystem, count: int, held: Flags) -> BodyMatrix:
         if number[b] >= 0:
             number[b] = nodes
             nodes += 1
+    return nodes, number
+
+
+@jitable
+def body_matrix(system: BodySystem, count: int, held: Flags) -> BodyMatrix:
+    """Return the matrix of contacts `held` of `count` bodies, analysed, with room for factors."""
+    bodies = system.bodies
+    nodes, number = _numbered(bodies, count, held)
     ptr, col = _neighbours(nodes, number, bodies, held)
     place = _places(bodies, held, number, ptr, col)
     analysis = analyse(nodes, ptr, col, SIX)
     return BodyMatrix(
         held, number, ptr, col, transposed_places(nodes, ptr, col),
-        np.empty((len(col), SIX, SIX)), place, analysis, elimination_flops(analysis, SIX),
-        room_for_factors(analysis, SIX * nodes), np.empty(SIX * nodes),
+        np.empty((len(col), SIX, SIX)), place, analysis, room_for_factors(analysis, SIX * nodes),
+        np.empty(SIX * nodes),
     )  # fmt: skip
+
+
+@jitable
+def work_of(analysis: Analysis, blocks: int, contacts: int) -> float:
+    """Return the estimated seconds of a Newton iteration (`factor_work`)."""
+    entries = float(analysis.factor_ptr[-1])
+    factors = factor_work(elimination_flops(analysis, SIX), 4 * blocks)
+    return factors + 1e-9 * entries + 5e-7 * contacts
+
+
+@jitable
+def newton_work(bodies: Indices, count: int) -> float:
+    """Return `work_of` contacts of `count` bodies that are all closed; nothing is factorised."""
+    held = np.ones(len(bodies), np.bool_)
+    nodes, number = _numbered(bodies, count, held)
+    ptr, col = _neighbours(nodes, number, bodies, held)
+    return work_of(analyse(nodes, ptr, col, SIX), len(col), len(bodies))
 
 
 @jitable

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from mbsim.core.jitable import jitable
-from mbsim.fclib.bodies.factors import BodyMatrix, body_matrix, closed_matrix
+from mbsim.fclib.bodies.factors import BodyMatrix, closed_matrix, newton_work, work_of
 from mbsim.fclib.bodies.newton import direction_of_bodies, function_of_bodies, linearise
 from mbsim.fclib.bodies.system import (
     SIX,
@@ -24,7 +24,6 @@ from mbsim.fclib.bodies.system import (
 )
 from mbsim.fclib.clock import late
 from mbsim.fclib.cone import bring_into_cones
-from mbsim.fclib.factor import factor_work
 from mbsim.fclib.solvers.proximal import (
     ALPHA,
     BEST,
@@ -183,17 +182,14 @@ def newton_on_bodies(
 
 @jitable
 def body_work(matrix: BodyMatrix) -> float:
-    """Return the estimated seconds of a Newton iteration with this matrix (`factor_work`)."""
-    entries = float(matrix.analysis.factor_ptr[-1])
-    factors = factor_work(matrix.flops, 4 * len(matrix.col))
-    return factors + 1e-9 * entries + 5e-7 * len(matrix.held)
+    """Return the estimated seconds of a Newton iteration with this matrix."""
+    return work_of(matrix.analysis, len(matrix.col), len(matrix.held))
 
 
 @jitable
 def all_contacts_work(system: BodySystem, matrix: BodyMatrix) -> float:
-    """Return `body_work` with all contacts closed; `matrix` says how many bodies there are."""
-    closed = np.ones(len(system.mu), np.bool_)
-    return body_work(body_matrix(system, len(matrix.number), closed))
+    """Return `newton_work` of a system; `matrix` says how many bodies there are."""
+    return newton_work(system.bodies, len(matrix.number))
 
 
 @jitable
