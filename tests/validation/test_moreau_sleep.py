@@ -147,7 +147,7 @@ def test_what_rolls_among_sleepers_finds_them(tmp_path: Path) -> None:
     ball = text.sphere(2, 3.0, 0.1, (-0.6, 0.45, 0.1), (2.0, 0.13, 0.0), (0.0, 20.0, 0.0))
     # which of two steps takes a hit is decided by rounding: that moves bodies by v h
     sleeping, awake = (
-        among(tmp_path, "sphere", 5, ball, 2.5, sleep, 0.002) for sleep in (True, False)
+        among(tmp_path, "sphere", 5, ball, 2.5, sleep, 0.001) for sleep in (True, False)
     )
     assert sleeping.stats["pair_listings"] > 3
     hit = 0
