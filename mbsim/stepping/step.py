@@ -81,6 +81,7 @@ from mbsim.stepping.impacts import (
     let_carry,
     let_land,
     let_meet,
+    let_share,
     look_ahead,
     postpone,
 )
@@ -305,6 +306,7 @@ def solve_step(scene: Scene, S: Stepping, h: float, committed: bool) -> int:
         if landing == MOST_LANDINGS - 1:
             break
         changed = let_carry(S, count, h)
+        changed = let_share(S, count) or changed
         if not let_land(S, count, h) and not changed:
             break
     if len(S.plan.members) > 0:

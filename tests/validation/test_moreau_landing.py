@@ -299,3 +299,28 @@ def test_what_rests_holds_in_very_short_steps(tmp_path, end) -> None:
     parts = [ball("ellipsoid", 0.05, EDGE + 0.05 + 0.3), base("cylinder")]
     results = run(tmp_path, parts, 200.0, None, end, 1e-3)
     assert results.audit.entries["energy"].value < ALLOWED["cylinder"][0]
+
+
+@pytest.mark.parametrize("together", [0.2, 0.5, 0.9])
+@pytest.mark.parametrize("lands", [0.3, 0.6, 0.95])
+def test_a_ball_that_meets_another_one_as_it_lands_keeps_its_energy(
+    tmp_path, lands, together
+) -> None:
+    """Impacts of one step were each taken where they are, its way by the first: 1 % was made."""
+    h, speed, radius = 0.02, 2.0, 0.1
+    # the fifth step has both
+    fall, meet = h * (4.0 + lands), h * (4.0 + together)
+    z, x = radius + 0.5 * p.GRAVITY * fall**2, radius + speed * meet
+    parts = [
+        text.sphere(2, 1.0, radius, (-x, 0.0, z), (speed, 0.0, 0.0)),
+        text.sphere(3, 1.0, radius, (x, 0.0, z), (-speed, 0.0, 0.0)),
+    ]
+    law = {"cnf_type": "POISSON", "penalty": 1e6, "restitution_coef": 1.0}
+    statements = [text.GROUND, text.FLOOR, *parts, text.contact(301, [200, 300], [100], **law)]
+    statements += [text.contact(302, [200], [300], **law), text.gravity()]
+    path = tmp_path / "deck.xml"
+    statements += text.fixed_step({"h": h})
+    path.write_text(text.deck("two at once", statements, 0.2), encoding="utf-8")
+    results = mbsim.simulate(mbsim.read_model(path), integrator="MOREAU", tol=1e-3)
+    energy = results["energy/kinetic"] + results["energy/potential"]
+    np.testing.assert_allclose(energy, energy[0], rtol=1e-9)
