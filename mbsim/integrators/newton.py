@@ -47,9 +47,9 @@ GO_ON, SOLVED, HOPELESS = range(3)
 OFF = 0.2
 #: No correction need be smaller than this.
 ROUNDING = 1e-14
-#: What positions are rounded by moves velocities by so much at most where what is stiff presses:
-#: a correction that is no larger, and gets no smaller, may be a larger part of a step's error.
-STIFF_ROUNDING = 1e-9
+#: What positions are rounded by moves velocities by so much where what is stiff presses. Where tol
+#: asks for less a correction that gets no smaller may be as large, up to `OFF` of what may be left.
+STIFF_ROUNDING = 3e-10
 #: Friction may be left off by this part of what presses, where only rounding is left of the motion.
 FELT = 1e-6
 #: Hope for the first correction ends here: what was linear a step ago may press on something now.
@@ -153,6 +153,12 @@ def judge(
 
 
 @jitable
+def stiff_rounding(m: Method) -> float:
+    """Return `STIFF_ROUNDING` where the tolerance asks for smaller corrections, else 0."""
+    return STIFF_ROUNDING if LEFT * judged_by(m) < STIFF_ROUNDING else 0.0
+
+
+@jitable
 def is_rounding(p: Problem, m: Method, t: float, h: float, size: float, e: F1) -> bool:
     """Return whether a correction e of `size`, no better than the one before, is rounding.
 
@@ -160,7 +166,7 @@ def is_rounding(p: Problem, m: Method, t: float, h: float, size: float, e: F1) -
     usual speed changes by 1e3 times what velocities are rounded by, and joints near a singular
     position round these worse: of friction counts what it can do, not what tol is.
     """
-    most = max(LEFT * judged_by(m), min(OFF * judged_by(m), STIFF_ROUNDING))
+    most = max(LEFT * judged_by(m), min(OFF * judged_by(m), stiff_rounding(m)))
     some = size <= most
     some = some or (size <= FELT and call_float(p.norm, (p.context, t, h, e, m.y)) <= most)
     m.memory[AT_ROUNDING] = 1.0 if some else 0.0
@@ -168,15 +174,15 @@ def is_rounding(p: Problem, m: Method, t: float, h: float, size: float, e: F1) -
 
 
 @jitable
-def nears_rounding(size: float, before: float) -> bool:
+def nears_rounding(m: Method, size: float, before: float) -> bool:
     """Return whether a correction that gets smaller yet is nearly what rounding makes."""
-    return size < STIFF_ROUNDING and size < HALF * before
+    return size < stiff_rounding(m) and size < HALF * before
 
 
 @jitable
 def is_at_rounding(m: Method) -> bool:
     """Return whether the last iteration ended at rounding: a new linearisation mends nothing."""
-    return m.memory[AT_ROUNDING] == 1.0 and m.memory[CORRECTION] <= STIFF_ROUNDING
+    return m.memory[AT_ROUNDING] == 1.0 and m.memory[CORRECTION] <= stiff_rounding(m)
 
 
 @jitable

@@ -284,7 +284,7 @@ def iterate(p: Problem, m: Method, t: float, h: float, anew: bool) -> int:
             slowest = rate
             if word == HOPELESS and size < SECOND * before:
                 word, rate = GO_ON, 0.0
-        elif word == HOPELESS and own and iteration < MOST and nears_rounding(size, before):
+        elif word == HOPELESS and own and iteration < MOST and nears_rounding(m, size, before):
             word = GO_ON
         if iteration > 2 and (size < HALF * before or size > LEFT * m.memory[TOL]):
             # else rounding, which is the same at any step
