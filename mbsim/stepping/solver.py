@@ -53,15 +53,17 @@ WORST = 5.0
 STILL = 0.25
 #: Points that press up to which Newton's method finishes in any case, and sweeps that an iteration
 #: of it takes at most where more do, or part of those that were taken. In columns it takes 8, in
-#: walls 12, in heaps 15 to 30; warm starts go on from step to step.
+#: pyramids of 200 bodies 11, in heaps 15 to 33 (`tests/fclib/test_bodies.py`); warm starts go on
+#: from step to step.
 NEWTON_POINTS, MANY_SWEEPS, OF_SWEEPS = 300, 9.0, 0.1
 #: The same at rest.
 SWEEPS_AT_REST = 14.0
 #: Seconds that a sweep takes for a point, as `fclib.factor.factor_work` counts; up to so many times
 #: as many points an iteration is taken to cost as before.
 SWEEP_WORK, ALIKE = 1e-7, 1.1
-#: Newton iterations of a step at most, and the smallest error that they go for.
-NEWTONS, SHARPEST = 40, 1e-13
+#: Newton iterations of a step at most, the part of what may be left that they go for, as the next
+#: step starts from what they find, and the smallest error.
+NEWTONS, FINISHED, SHARPEST = 40, 0.001, 1e-13
 
 
 @jitable
@@ -223,17 +225,17 @@ def what_follows(square: float, before: float, largest: float) -> float:
 def sweep_on(
     p: Points, M: Motion, count: int, may: tuple[float, float], most: int, newton: bool
 ) -> tuple[float, int, bool, bool]:
-    """Improve r and v of `count` points; return what a sweep still changes, sweeps, if solved.
+    """Improve r and v of `count` points.
 
-    And whether it is solved but for what sweeps to come would change.
-
+    Return what a sweep still changes, sweeps, whether it is solved, and whether that is but for
+    what sweeps to come would change.
     That is of a velocity, over what may be left of it, `least` of its point: `may` is a factor of
     that, and the part of jumps. Sweeps end where one of all pairs changes less than 1 in the square
     mean over what presses, and nowhere more than `WORST`, and those to come would change no more
-    than `SLACK`; or with `most`. Where `newton` does not finish what they leave they go on for that
-    only as long as they took before. Between them impulses go on along the way of the sweeps
-    before, as conjugate gradients do, which is dropped where a sweep changes more than the last
-    one.
+    than `SLACK`; or with `most`. They go on for that with `newton`, as that finishes what they
+    leave; else only for as long as they took before. Between them impulses go on along the way of
+    the sweeps before, as conjugate gradients do, which is dropped where a sweep changes more than
+    the last one.
     Source: M. Silcowitz, S. Niebe, K. Erleben, A nonsmooth nonlinear conjugate gradient method for
     interactive contact force problems, The Visual Computer 26 (2010) 893.
     """
@@ -305,7 +307,7 @@ def finish(p: Points, M: Motion, ground: int, closed: I1, sharp: float) -> int:
         w[row, 0] += p.ahead[k]
         for a in range(3):
             size += w[row, a] ** 2
-    tol = min(max(0.001 * allowed / max(math.sqrt(size), 1e-300), SHARPEST), 1e-3)
+    tol = min(max(FINISHED * allowed / max(math.sqrt(size), 1e-300), SHARPEST), 1e-3)
     found = solve_contacts(M.inverse, bodies, H, mu, w, r, tol, 0, NEWTONS)
     for row in range(count):
         if not math.isfinite(r[row, 0] + r[row, 1] + r[row, 2]):

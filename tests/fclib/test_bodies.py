@@ -7,15 +7,18 @@ import importlib.util
 import numpy as np
 import pytest
 from scipy import sparse
+from scipy.spatial import cKDTree
 
 from helpers.folders import data_file
 from mbsim.core import jit
 from mbsim.errors import ModelError
+from mbsim.fclib.bodies.factors import newton_work
 from mbsim.fclib.bodies.solve import solve_contacts
 from mbsim.fclib.merit import judge
 from mbsim.fclib.problem import Global, Solution, matrix
 from mbsim.fclib.reduction import local, reduce
 from mbsim.fclib.solve import solve
+from mbsim.stepping.solver import SWEEP_WORK
 
 
 def pile(bodies, contacts, d=3, seed=0, size=6):
@@ -153,3 +156,50 @@ def case(name):
 def test_piles_come_to_1e_4(name):
     result = solve(case(name), 1e-4, max_seconds=60.0)
     assert result.status == "solved"
+
+
+def column_of(count):
+    """Return the bodies of each contact in a column of cubes: four corners on the one below."""
+    return [(k, k - 1) for k in range(count) for _ in range(4)], count
+
+
+def pyramid_of(layers):
+    """Return those in a pyramid: each cube lies with two corners on either of two, or on ground."""
+    number = {}
+    for row in range(layers):
+        for place in range(layers - row):
+            number[row, place] = len(number)
+    pairs = []
+    for (row, place), body in number.items():
+        below = [number[row - 1, place + side] for side in range(2)] if row else [-1, -1]
+        pairs += [(body, other) for other in below for _ in range(4)]
+    return pairs, len(number)
+
+
+def heap_of(count, touching):
+    """Return those in a heap of spheres at random places that touch so many others each."""
+    places = np.random.default_rng(0).random((count, 3))
+    # n spheres of radius d/2 at random places have n^2 / 2 * 4/3 pi d^3 pairs in a unit cube
+    d = (1.5 * touching / (2.0 * np.pi * count)) ** (1.0 / 3.0)
+    near = cKDTree(places).query_pairs(d)
+    return sorted(near) + [(k, -1) for k in range(count // 5)], count
+
+
+@pytest.mark.parametrize(
+    ("pile", "least", "most"),
+    [
+        (column_of(10), 7, 9),
+        (column_of(100), 7, 9),
+        (pyramid_of(10), 8, 9),
+        (pyramid_of(20), 11, 12),
+        (heap_of(300, 4), 14, 15),
+        (heap_of(1000, 4), 16, 17),
+        (heap_of(1000, 6), 33, 34),
+    ],
+)
+def test_what_newton_costs_tells_columns_from_heaps(pile, least, most):
+    """In sweeps of MOREAU's solver: it is by factors' fill, and nothing is factorised for it."""
+    pairs, count = pile
+    bodies = np.array(pairs, dtype=np.int64)
+    work = jit.function(newton_work)(bodies, count) / (SWEEP_WORK * len(bodies))
+    assert least < work < most

@@ -23,19 +23,17 @@ def column(folder: Path, count: int, ball: bool, step: float, tol: float) -> mbs
     return run(folder, parts, step, tol)
 
 
-def run(folder: Path, parts: list[str], step: float, tol: float) -> mbsim.Results:
-    """Run bodies 2, 3, ... on a floor, and on each other, for 4 s."""
-    ids = [100 * (2 + k) for k in range(len(parts))]
+def run(folder: Path, parts: list[str], step: float, tol: float, *apart: str) -> mbsim.Results:
+    """Run bodies 2, 3, ... on a floor, and on each other, for 4 s, and others apart from them."""
     law = text.impact(1e5, 1.0, 30.0, 1e-5) | text.coulomb(0.5, 1e-3)
-    statements = [
-        text.GROUND,
-        text.FLOOR,
-        *parts,
-        text.contact(301, ids, [100], **law),
-        text.contact(302, ids, ids, **law),
-        text.gravity(),
-        *text.fixed_step({"h": step}),
-    ]
+    statements, body = [text.GROUND, text.FLOOR, *parts, *apart], 2
+    for k, bodies in enumerate((parts, apart)):
+        ids = [100 * (body + row) for row in range(len(bodies))]
+        body += len(bodies)
+        if ids:
+            statements.append(text.contact(301 + 2 * k, ids, [100], **law))
+            statements.append(text.contact(302 + 2 * k, ids, ids, **law))
+    statements += [text.gravity(), *text.fixed_step({"h": step})]
     path = folder / "column.xml"
     path.write_text(text.deck("a column of cubes", statements, 4.0), encoding="utf-8")
     return mbsim.simulate(path, integrator="MOREAU", tol=tol)
@@ -99,3 +97,22 @@ def test_a_pyramid_comes_to_rest(tmp_path: Path, step: float) -> None:
     assert results.audit.warnings == ()
     assert moved(results, len(rows)) < 1e-4
     assert results.stats["asleep_at_end"] == len(rows)
+
+
+@pytest.mark.parametrize("count", [10, 100])
+def test_a_column_stands_beside_a_heap_that_moves(tmp_path: Path, count: int) -> None:
+    """What moves elsewhere has most points, and takes most sweeps: the column is judged for itself.
+
+    Lengths are judged by its own group.
+    """
+    cubes = [
+        text.cuboid(2 + k, 1.0, (EDGE,) * 3, (0.0, 0.0, (k + 0.5) * EDGE)) for k in range(count)
+    ]
+    rng = np.random.default_rng(3)
+    balls = []
+    for k in range(100):
+        place = (3.0 + 0.21 * (k % 5), 0.21 * (k // 5 % 5), 0.3 + 0.25 * (k // 25))
+        speed = (*rng.normal(scale=0.5, size=2), 0.0)
+        balls.append(text.sphere(2 + count + k, 1.0, 0.1, place, speed))
+    results = run(tmp_path, cubes, 1e-2, 1e-2, *balls)
+    assert moved(results, count) < 1e-4
