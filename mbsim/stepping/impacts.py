@@ -119,21 +119,23 @@ def let_carry(S: Stepping, count: int, h: float) -> bool:
 
 @jitable
 def let_share(S: Stepping, count: int) -> bool:
-    """Let all impacts of a body be where the first one divides its way, where they give all back.
+    """Let impacts of a body be where the first one divides its way, where they would do work.
 
-    Elsewhere in the step its weight had another velocity to work on than its way has, and contacts
-    with a restitution of 1 did work. Return whether there were any.
+    Elsewhere in the step its weight had another velocity to work on than its way has. Points that
+    give back all do none then, and no others do any. Return whether there were any.
     """
     P, M, some = S.points, S.motion, False
     for k in range(count):
         if P.r[k, 0] == 0.0 or P.part[k] == NO_IMPACT:
             continue
         i = P.body[k, 0] if P.body[k, 0] != len(S.rest.body) else P.body[k, 1]
-        part = M.part[i]
-        if S.rules.number[P.contact[k], RESTITUTION] != 1.0 or not part < P.part[k]:
+        part, restitution = M.part[i], S.rules.number[P.contact[k], RESTITUTION]
+        if not part < P.part[k]:
             continue
-        before, free = P.closing[k], velocity_of(P, k, 0, M.flight)
-        ahead = -max((1.0 - 2.0 * part) * (free - before) - before, 0.0)
+        comes, flown = P.closing[k], velocity_of(P, k, 0, M.flight) - P.closing[k]
+        if restitution < 1.0 and comes + (2.0 * part - 1.0) * flown <= P.ahead[k]:
+            continue
+        ahead = -max((1.0 - part) * flown - restitution * (comes + part * flown), 0.0)
         some = some or abs(ahead - P.ahead[k]) > P.least[k]
         P.part[k], P.ahead[k] = part, ahead
     return some
