@@ -269,8 +269,10 @@ def solve_law(S: Stepping, count: int, ground: int, h: float) -> tuple[float, fl
         if attempt < MOST_POSTPONED:
             changed = postpone(S, count, h) or changed
         tried = attempt
+        # what begins to stick is not asked yet whether it holds: velocities are those of its slip
+        changed = let_yield(S, count, h, sharp) or changed
         changed = let_stick(S, count, h) or changed
-        if not let_yield(S, count, h, sharp) and not changed:
+        if not changed:
             break
     if tried >= MOST_POSTPONED:
         # what these threw at each other flies on: pressed together it would be given energy
