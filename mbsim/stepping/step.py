@@ -184,9 +184,10 @@ def prepare_points(scene: Scene, S: Stepping, h: float) -> int:
         if is_still(S, k):
             P.least[k] = left_at_rest(S, g, h)
             M.still[0] += 1
-        if row >= 0 and slip <= noise_of(S, g, h):
-            # what stuck moves by what the solver left of it
-            slip = 0.0 if S.kept.table[row, KEPT_STICKS] == 1.0 else slip
+        if row >= 0 and S.kept.table[row, KEPT_STICKS] == 1.0:
+            # what stuck moves by what the solver left of it, and beside what is driven by what
+            # its mean velocity over a step is off: friction says by its load whether it holds on
+            slip = 0.0
         P.holds[k] = coefficient(S, P.contact[k], slip)
     return 0
 
