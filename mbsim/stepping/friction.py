@@ -11,6 +11,7 @@ from mbsim.stepping.arrays import (
     DROPS,
     DUE,
     FIRST_SPEED,
+    KEPT_STICKS,
     NEAR,
     OF_FIRST,
     OF_SECOND,
@@ -28,6 +29,8 @@ from mbsim.stepping.scales import group_at, noise_of
 
 #: Changes of mu that do not count, over tol, and at most.
 YIELDS, LARGEST_YIELD = 10.0, 1e-3
+#: Points of a pair that sticks do so up to this times the speed of those that pressed.
+FASTER = 2.0
 #: A load as large as it may be.
 SATURATED = 1.0 - 1e-9
 #: Loads from which on they are to be known, and how well, over tol.
@@ -55,6 +58,44 @@ def coefficient(S: Stepping, c: int, slip: float) -> float:
             high = middle
     part = (slip - knots[low, 0]) / (knots[high, 0] - knots[low, 0])
     return knots[low, 1] + part * (knots[high, 1] - knots[low, 1])
+
+
+@jitable
+def stuck(S: Stepping, k: int) -> bool:
+    """Return whether point k pressed in the last step, and stuck."""
+    row = S.points.was[k]
+    return row >= 0 and S.kept.table[row, KEPT_STICKS] == 1.0
+
+
+@jitable
+def slip_before(S: Stepping, k: int) -> float:
+    """Return how fast point k slips at the step's begin."""
+    v = S.motion.before
+    x, z = velocity_of(S.points, k, 1, v), velocity_of(S.points, k, 2, v)
+    return math.sqrt(x * x + z * z)
+
+
+@jitable
+def begin_friction(S: Stepping, count: int, h: float) -> None:
+    """Fill the coefficients by which a step begins: those of slip, or of sticking.
+
+    What stuck holds on: by its load it is found whether it does. It moves by what the solver left
+    of it; beside what is driven, or turns, also by how far its velocity is from the mean one of a
+    step, of order h. Other points of its pair that are no faster begin to press where it sticks.
+    """
+    P, begin = S.points, 0
+    while begin < count:
+        end, fastest = begin, -1.0
+        while end < count and P.key[end] == P.key[begin]:
+            if stuck(S, end):
+                fastest = max(fastest, slip_before(S, end))
+            end += 1
+        for k in range(begin, end):
+            slip = slip_before(S, k)
+            if fastest >= 0.0 and slip <= FASTER * fastest + noise_of(S, group_at(S, k), h):
+                slip = 0.0
+            P.holds[k] = coefficient(S, P.contact[k], slip)
+        begin = end
 
 
 @jitable

@@ -37,7 +37,6 @@ from mbsim.stepping.arrays import (
     ALL_SWEEPS,
     FIXED,
     HIT,
-    KEPT_STICKS,
     LEFT_PART,
     MAY_BE_LEFT,
     NEWTONS,
@@ -67,7 +66,7 @@ from mbsim.stepping.energy import add_losses, keep_left, left_by_forces, left_by
 from mbsim.stepping.forces import find_forces_within, find_motion
 from mbsim.stepping.free_motion import fill_motion, turn_to_global
 from mbsim.stepping.friction import (
-    coefficient,
+    begin_friction,
     keep_loads,
     left_near_yield,
     let_jam,
@@ -89,7 +88,7 @@ from mbsim.stepping.implicit import is_implicit, take_into_step
 from mbsim.stepping.kept import index_kept, recall
 from mbsim.stepping.missed import find_missed
 from mbsim.stepping.near_pairs import FARTHER, list_anew
-from mbsim.stepping.one_point import apply, fill_drift, velocity_of
+from mbsim.stepping.one_point import apply, fill_drift
 from mbsim.stepping.pairs import find_points
 from mbsim.stepping.points import fill_answers, fill_point, fill_reach, way_at
 from mbsim.stepping.rebound import limit_rebound
@@ -177,18 +176,12 @@ def prepare_points(scene: Scene, S: Stepping, h: float) -> int:
     if count > 0:
         find_still(scene, S, h)
     for k in range(count):
-        x, z = velocity_of(P, k, 1, M.before), velocity_of(P, k, 2, M.before)
-        slip, row = math.sqrt(x * x + z * z), P.was[k]
         g = group_at(S, k)
         P.speed[k], P.least[k] = S.plan.scale[g, SPEED], left_of(S, g, h)
         if is_still(S, k):
             P.least[k] = left_at_rest(S, g, h)
             M.still[0] += 1
-        if row >= 0 and S.kept.table[row, KEPT_STICKS] == 1.0:
-            # what stuck moves by what the solver left of it, and beside what is driven by what
-            # its mean velocity over a step is off: friction says by its load whether it holds on
-            slip = 0.0
-        P.holds[k] = coefficient(S, P.contact[k], slip)
+    begin_friction(S, count, h)
     return 0
 
 
@@ -266,10 +259,11 @@ def solve_law(S: Stepping, count: int, ground: int, h: float) -> tuple[float, fl
             # not for what is less by rounding alone: tries are few
             sharp = near
             continue
-        changed = let_meet(S, count, h)
-        if attempt < MOST_POSTPONED:
-            changed = postpone(S, count, h) or changed
         tried = attempt
+        changed = let_meet(S, count, h)
+        if attempt < MOST_POSTPONED and postpone(S, count, h):
+            # velocities are no solution now that friction could be judged by
+            continue
         # what begins to stick is not asked yet whether it holds: velocities are those of its slip
         changed = let_yield(S, count, h, sharp) or changed
         changed = let_stick(S, count, h) or changed
