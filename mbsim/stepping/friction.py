@@ -116,7 +116,7 @@ def load_of(S: Stepping, begin: int, end: int) -> float:
 
 
 @jitable
-def let_yield(S: Stepping, count: int, h: float, sharp: float) -> bool:
+def let_yield(S: Stepping, count: int, h: float) -> bool:
     """Lower mu where what stuck slips, to that of its slip; return whether that changed much.
 
     A step in which friction yields is then one that slides from its begin: steps by error end where
@@ -136,7 +136,7 @@ def let_yield(S: Stepping, count: int, h: float, sharp: float) -> bool:
             slip = math.sqrt(x * x + z * z)
             if load < 0.0:
                 load = load_of(S, begin, end)
-            if load < SATURATED and slip <= sharp * noise_of(S, group_at(S, k), h):
+            if load < SATURATED and slip <= noise_of(S, group_at(S, k), h):
                 continue
             mu = coefficient(S, P.contact[k], slip)
             if mu < least * P.mu[k]:

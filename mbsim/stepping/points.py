@@ -7,7 +7,7 @@ import math
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1, V3
 from mbsim.core.jitable import jitable
-from mbsim.core.rotation import any_tangent, cross, dot, norm, vector
+from mbsim.core.rotation import add, any_tangent, cross, dot, norm, scale, vector
 from mbsim.dynamics.bodies.awake import graphic_awake, graphics_awake
 from mbsim.dynamics.bodies.kinematics import position
 from mbsim.dynamics.contact.forces import IGNORE_DEEPER, sides
@@ -169,12 +169,28 @@ def put_three(row: F1, at: int, a: V3, b: V3, c: V3) -> None:
 
 
 @jitable
+def common_spin(S: Stepping, k: int) -> V3:
+    """Return the spin of what bears at point k: that of both bodies, or of the one that turns less.
+
+    Contacts are solved as that sees them: on a turntable as on a table that stands.
+    """
+    P, v = S.points, S.motion.before
+    a, b = vector(v[P.body[k, 0]], 3), vector(v[P.body[k, 1]], 3)
+    of_a, of_b = dot(a, a), dot(b, b)
+    if of_a == 0.0 or of_b == 0.0:
+        return 0.0, 0.0, 0.0
+    part = of_b / (of_a + of_b)
+    return add(scale(part, a), scale(1.0 - part, b))
+
+
+@jitable
 def put_side(
-    S: Stepping, k: int, side: int, axes: tuple[V3, V3, V3]
+    S: Stepping, k: int, side: int, axes: tuple[V3, V3, V3], turn: V3
 ) -> tuple[float, float, float, float, float, float]:
     """Fill what point k does to one of its bodies, and how that turns it; return its part of W.
 
-    That is of (nn, nx, nz, xx, xz, zz); none of ground.
+    That is of (nn, nx, nz, xx, xz, zz); none of ground. Friction acts on the arm as it is at the
+    step's end, turned by a small turn: there it is that what sticks has no slip.
     """
     P, b, row = S.points, S.points.body[k, side], S.points.given[k]
     at, to = TURN + 9 * side, SPIN + 9 * side
@@ -186,7 +202,8 @@ def put_side(
     inverse, arm = S.motion.inverse[b], vector(P.arm[k, side])
     light = inverse[0, 0]
     row[LIGHT + side] = light
-    n, x, z = cross(arm, axes[0]), cross(arm, axes[1]), cross(arm, axes[2])
+    end = add(arm, cross(turn, arm))
+    n, x, z = cross(arm, axes[0]), cross(end, axes[1]), cross(end, axes[2])
     put_three(row, at, n, x, z)
     i, j, m = vector(inverse[3], 3), vector(inverse[4], 3), vector(inverse[5], 3)
     by_n = (dot(i, n), dot(j, n), dot(m, n))
@@ -204,7 +221,7 @@ def put_side(
 
 
 @jitable
-def fill_point(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
+def fill_point(scene: Scene, S: Stepping, k: int, begin: int, h: float) -> bool:
     """Fill the axes of point k, what it does to its bodies and its closing speed; False if no room.
 
     `begin` is the first of the wide rows that are not in use. What held bodies answer is found
@@ -214,7 +231,8 @@ def fill_point(scene: Scene, S: Stepping, k: int, begin: int) -> bool:
     n, x = vector(P.normal[k]), vector(P.tangent[k])
     axes = (n, x, cross(n, x))
     put_three(row, AXES, axes[0], axes[1], axes[2])
-    i, j = put_side(S, k, 0, axes), put_side(S, k, 1, axes)
+    turn = scale(h, common_spin(S, k))
+    i, j = put_side(S, k, 0, axes, turn), put_side(S, k, 1, axes, turn)
     for c in range(6):
         row[W_NN + c] = i[c] + j[c]
     P.closing[k] = velocity_of(P, k, 0, S.motion.before)

@@ -167,7 +167,7 @@ def prepare_points(scene: Scene, S: Stepping, h: float) -> int:
     count, begin = S.tally.count[POINTS], 0
     begin_answers(S)
     for k in range(count):
-        if not fill_point(scene, S, k, begin):
+        if not fill_point(scene, S, k, begin, h):
             return Code.MANY_POINTS
         begin += P.many[k] if P.wide[k] >= 0 else 0
     fill_answers(scene, S)
@@ -265,7 +265,7 @@ def solve_law(S: Stepping, count: int, ground: int, h: float) -> tuple[float, fl
             # velocities are no solution now that friction could be judged by
             continue
         # what begins to stick is not asked yet whether it holds: velocities are those of its slip
-        changed = let_yield(S, count, h, sharp) or changed
+        changed = let_yield(S, count, h) or changed
         changed = let_stick(S, count, h) or changed
         if not changed:
             break
