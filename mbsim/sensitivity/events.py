@@ -65,7 +65,7 @@ SURE = 0.01
 #: By how much, over that, what is kept may differ between the run and both sides.
 ALIKE = 0.03
 #: Times are rounded as forces are: the parameter is changed by so much more for them at first.
-WIDER = 30.0
+WIDER = 10.0
 #: So often a smaller difference is tried for the time of a change; so often farther behind it.
 TRIES, TRIES_BEHIND = 6, 10
 #: A jump of f below this part of its size is none; where it is found beside the run itself.

@@ -179,11 +179,7 @@ class Sensitivities:
             path=np.zeros((0, n)),
             work=np.zeros((WORK, n)),
             error=np.zeros(count),
-            shown_error=np.zeros(count),
-            largest=np.zeros(count),
             enough=enough(self.system, tol),
-            rate=np.full(count, 0.99),
-            moved=np.zeros(count),
             carried=np.zeros((count, 4, n)),
             bend=np.zeros((count, n)),
             jump=np.zeros((5, n)),
@@ -400,6 +396,10 @@ class Sensitivities:
 def _of_jumps(count: int, n: int) -> dict[str, Any]:
     """Return arrays of `timed` and of rows, for so many parameters and numbers of y; `_FLAGS`."""
     return {name: np.zeros(count, dtype=np.int64) for name in _FLAGS} | {
+        "shown_error": np.zeros(count),
+        "largest": np.zeros(count),
+        "rate": np.full(count, 0.99),
+        "moved": np.zeros(count),
         "gap": np.full(3, math.nan),
         "moves": np.zeros((count, 2)),
         "shown": np.zeros((count, 2)),
