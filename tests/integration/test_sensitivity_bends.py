@@ -124,7 +124,7 @@ def test_slip_that_turns_round_stretches_bristles(law, integrator):
         # as it stops, how its slip turns is to the tolerance of an explicit method
         ("DOPRI5", 1e-8, 3e-3),
         ("DOPRI5", 1e-9, 4e-4),
-        ("DOPRI5", 1e-10, 3e-5),
+        ("DOPRI5", 1e-10, 6e-5),
     ],
 )
 def test_corners_stick_one_after_the_other(integrator, tol, most):
