@@ -19,15 +19,18 @@ from mbsim.sensitivity.arrays import (
     ALIKE,
     APART,
     BEGINS,
+    CORNERS,
     DOWN_SIDE,
     ENDS,
     FROM,
     IS_LATER,
+    LENGTH,
     LINE_F,
     LINE_Y,
     LONG,
     MOST_PARTS,
     ODD,
+    REMEMBERED,
     STRAIGHT,
     TWIN,
     UP,
@@ -36,6 +39,7 @@ from mbsim.sensitivity.arrays import (
 )
 from mbsim.sensitivity.tableaus import DENSE, LAST, A, C, E
 from mbsim.sensitivity.twin import (
+    acts,
     keep_change,
     keep_depths,
     keep_side,
@@ -53,6 +57,8 @@ EVEN, SOFT_BEGIN, SOFT_END = range(3)
 #: Parts of a stretch by which its ends are left, until both sides of a difference touch alike; up
 #: to which that is less than what a smaller difference is off by.
 NEAREST, FARTHER, NEAR = 1e-12, 4.0, 1e-3
+#: A step is very short below this part of the length of straight lines.
+SHORT = 0.01
 #: A difference is no smaller than this part of the usual one.
 LEAST = 1e-4
 
@@ -66,6 +72,9 @@ def point_at(V: Variations, s: float, out: F1) -> None:
             out[i] = V.jump[LINE_Y, i] + (s - 1.0) * V.line[0] * V.jump[LINE_F, i]
         return
     last = len(path) - 1
+    if (s < 0.0 or s > 1.0) and V.line[LENGTH] < SHORT * V.line[0]:
+        # beyond a very short step its polynomial is all rounding
+        last = 1
     for i in range(len(out)):
         value = path[last, i]
         for j in range(last - 1, -1, -1):
@@ -92,11 +101,20 @@ def slope_at(
             return code
         count, sum = twin.work.hit[len(twin.work.hit) - 1], 0
         for j in range(count):
-            sum += 1 + twin.work.hit[j]
+            sum += acts(V, twin, twin.work.hit[j]) * (1 + twin.work.hit[j])
         V.words[ALIKE + side] = sum
     for i in range(len(out)):
         out[i] = 0.5 / e * (w[UPPER, i] - w[LOWER, i])
     return 0
+
+
+@jitable
+def jumps(V: Variations) -> bool:
+    """Return whether friction of some contact jumps as it begins or ends."""
+    for c in range(len(V.breaks)):
+        if V.breaks[c] == 1:
+            return True
+    return False
 
 
 @jitable
@@ -128,6 +146,9 @@ def clear_slope(
         elif off < 0.5:
             off = min(0.5, FARTHER * off)
         else:
+            if jumps(V):
+                # the stretch is shorter than sides are apart, and what lies between no derivative
+                w[row, :] = 0.0
             return 0
 
 
@@ -198,8 +219,8 @@ def try_part(
         off = 0.0
         for j in range(last + 1):
             off += E[row, j] * w[FIRST + j, i]
-        error = max(error, abs(part * off) / V.scale[i])
-        whole = max(whole, abs(w[STAGE, i]) / V.scale[i], abs(d[i]) / V.scale[i])
+        error = max(error, abs(part * off) / V.felt[i])
+        whole = max(whole, abs(w[STAGE, i]) / V.felt[i], abs(d[i]) / V.felt[i])
     return 0, error / whole
 
 
@@ -250,6 +271,17 @@ def value_within(V: Variations, k: int, s: float) -> float:
     for i in range(V.next.shape[1]):
         V.next[k, i] = c[0, i] + x * (c[1, i] + r * (c[2, i] + x * (c[3, i] + r * c[4, i])))
     return about[IS_LATER]
+
+
+@jitable
+def tell(V: Variations, k: int) -> None:
+    """Keep D' at the end of a step along the motion: the next one's is to be the same.
+
+    Of friction that tells stick from slip it is not: what that keeps is taken anew.
+    """
+    V.told[k] = 1 if V.words[REMEMBERED] == 0 else V.words[CORNERS]
+    for i in range(V.slope.shape[1]):
+        V.slope[k, i] = V.work[FIRST, i]
 
 
 @jitable

@@ -48,9 +48,12 @@ COLLIDES = 33
 JUMPS = 34
 # whether something follows time, so that it may jump
 TIMED = 35
-# whether a user's subroutine acts, which may jump where it likes
-ASKS_USERS = 36
-WORDS = 37
+# why a derivative ends where a jump within a step moves, 0 where none may be: LOST_USER if a user's
+# subroutine acts, which may jump where it likes
+HIDES = 36
+# whether friction acts whose force bends where slip turns round, within a step
+CORNERS = 37
+WORDS = 38
 #: Rows of `Variations.far` and `depth`: either side of a difference, and the run itself.
 UP_SIDE, DOWN_SIDE, OWN = range(3)
 #: Rows of `Variations.jump`: y before the commit, f before and behind it; y and f of the straight
@@ -68,6 +71,8 @@ USUAL_CHANGE = 2
 #: Where a part of a stretch ended that was too long, how long it was, its error over what that may
 #: be; between which parts of a stretch f bends.
 WALL, PART_TO_WALL, ERROR_TO_WALL, BEND, BEHIND_BEND = range(3, 8)
+#: How long the step is that is taken [T].
+LENGTH = 8
 #: Numbers of a row of `Variations.later`: at the begin of the last step, behind it.
 LAST_UNTIL, LAST_ON = range(2)
 #: Numbers of a row of `Variations.shown`: part of the last step, `later` there.
@@ -130,13 +135,14 @@ class Variations(NamedTuple):
     reach: F1  # (P,) by how much a parameter may be changed for depths, 0: not known
     odd: tags.Scratch[I2]  # (2, ns) 1 where friction asks for another branch beside the run
     depth: tags.Scratch[F2]  # (3, ns) how deep slots are at the end of a step, rows as of `far`
-    # (8,) length of the straight line [T]; APART, USUAL_CHANGE, WALL and what follows
+    # (9,) length of the straight line [T]; APART, USUAL_CHANGE, WALL and what follows
     line: tags.Scratch[F1]
     # (P, ns + 1) by how much slots change their branch later, by the parameter; what else does last
     shift: tags.Scratch[F2]
     times: tags.Scratch[F3]  # (P, ns + 1, 3) of the same: UP_TO, DOWN_TO [T], BY
     asks: tags.Scratch[I1]  # (ns + 1,) slots that ask for another branch, their number last
     reason: tags.Scratch[F1]  # (P,) why a derivative is lost at the end of the step, or 0
+    breaks: tags.Constant[I1]  # (contacts,) 1 where friction jumps as nothing presses any more
     seen: tags.Scratch[I1]  # (ns + 1,) in how many points of a step slots touched, of how many
     own: tags.Scratch[F1]  # (n,) a derivative, while D + s f is in its place
     # (P, n) derivative at the begin of the last step, or at its last row where that was along it
@@ -156,6 +162,8 @@ class Variations(NamedTuple):
     # those to one side take; and of usual ones those to both sides along a step
     one_sided: tags.Constant[F1]
     scale: tags.Constant[F1]  # (n,) usual size of a number of y
+    # (n,) the same for errors of derivatives: also of what friction carries, in the step taken
+    felt: tags.Scratch[F1]
     jumping: tags.Constant[F1]  # (n,) the same for jumps of f, also of what laws integrate
     room: tags.Constant[F1]  # (n,) by how much it may be changed for a difference
     weights: tags.Constant[F1]  # of an explicit method's stages; none where joints hold bodies
@@ -173,6 +181,11 @@ class Variations(NamedTuple):
     slopes: tags.Scratch[F2]
     slope: F2  # (P, n) D' of the last stage of an explicit method, or along the motion
     smooth: I1  # (P,) 1 where that is D' at the committed point
+    # (P,) 1 where it is so by other differences than those of the step that comes: sides differ
+    told: I1
+    # (P,) the most that a change of a parameter by its own size does, in usual sizes of y
+    largest: F1
+    shown_error: F1  # (P,) estimate of a step of RADAU5 for the next one, 0: not known
     size: tags.Constant[F1]  # (P,) of a parameter
     first: tags.Constant[I1]  # (P + 1,) first of the numbers that a parameter changes
     place: tags.Constant[I1]  # where each of these is

@@ -13,7 +13,7 @@ from mbsim.core.address import call_int, view
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import ASK
-from mbsim.dynamics.contact.forces import BRANCH, DEPTH, FOUND_AT
+from mbsim.dynamics.contact.forces import BRANCH, DEPTH, FOUND_AT, NORMAL, contact_of
 from mbsim.integrators.scheme import in_workspace
 from mbsim.laws.catalog import UNDECIDED
 from mbsim.sensitivity.along import (
@@ -47,7 +47,7 @@ from mbsim.sensitivity.arrays import (
 from mbsim.sensitivity.branches import ANY_BRANCH, branch_of, find_change, tells
 from mbsim.sensitivity.later import add, add_motion, touch_later
 from mbsim.sensitivity.stretches import integrate
-from mbsim.sensitivity.twin import set_parameter, step_along_motion
+from mbsim.sensitivity.twin import acts, has_acted, set_parameter, step_along_motion
 
 #: A change is looked for within so many lengths of a step of where the run has it.
 FARTHEST = 100.0
@@ -60,6 +60,8 @@ JUMPS = 1e-13
 #: Contacts change at once where they do within this part of the step, as corners of a flat side.
 #: In a short step rounding of depths sets them apart, by this part of the straight line's length.
 AT_ONCE, ROUNDING = 1e-10, 1e-9
+#: Where a normal force is zero is known to this part of the step.
+ROUNDING_OF_FORCE = 1e-9
 #: A jump of a derivative counts from this part of usual sizes on.
 COUNTS = 1e-8
 #: So often a smaller difference is tried for the time of a change.
@@ -95,7 +97,7 @@ def touches(
         branch = twin.work.slot[asked, BRANCH]
         return 1 if branch != UNDECIDED and branch != scene.state.mode[asked] else 0
     code = call_int(p.rhs, (p.context, t + s * h, s * h, w[POINT], w[UPPER]))
-    return -code if code != 0 else twin.work.touching[slot]
+    return -code if code != 0 else acts(V, twin, slot)
 
 
 @jitable
@@ -111,7 +113,7 @@ def crossing(
         found = find_change(V, scene, t, h, k, e, branch_of(slot), around)
         if not math.isnan(found):
             return found
-    before = 1 - scene.work.touching[slot] if slot >= 0 else 0
+    before = 1 - acts(V, scene, slot) if slot >= 0 else 0
     low, high = 0.0, 1.0
     if around > 0.0:
         low, high = around, around
@@ -137,7 +139,8 @@ def crossing(
         if found < 0:
             return math.nan
         if found == 1 and slot >= 0:
-            now = twin.work.slot[slot, DEPTH]
+            breaks = V.breaks[contact_of(scene, slot)] == 1
+            now = twin.work.slot[slot, NORMAL if breaks else DEPTH]
             guess = middle - now * (middle - last) / (now - depth) if now != depth else math.nan
             # a little farther, so that the other end of what is left comes near as well
             off = NUDGE * (guess - middle)
@@ -158,7 +161,10 @@ def list_changes(V: Variations, scene: Scene, t: float, h: float) -> bool:
         hit = now if side == 0 else then
         for j in range(hit[len(hit) - 1]):
             s = hit[j]
-            if scene.work.touching[s] == scene.state.touching[s]:
+            if acts(V, scene, s) == has_acted(V, scene, s):
+                continue
+            if side == 1 and scene.work.touching[s] == 1:
+                # it is in the other list too
                 continue
             if count == MOST_CHANGES:
                 return False
@@ -282,7 +288,9 @@ def transfer(
     Return a code. Each of these has a jump and a time of its own. With the parameter changed by e
     they change one after the other, or they move alike and what they jump by is shared.
     """
-    (j, last), near, total = span, nearest(t, h), V.work[SUM]
+    (j, last), total = span, V.work[SUM]
+    breaks = V.breaks[contact_of(scene, int(V.change[j, SLOT]))] == 1
+    near = max(nearest(t, h), ROUNDING_OF_FORCE) if breaks else nearest(t, h)
     first, wide = V.change[j, AT_PART], V.change[last, AT_PART] - V.change[j, AT_PART]
     if jump_at(V, scene, t, h, k, first, 0.0, near + wide) <= JUMPS:
         return 0
@@ -311,10 +319,13 @@ def transfer(
 
 @jitable
 def is_bent(V: Variations, scene: Scene) -> bool:
-    """Return whether a slot touched in some of the points of a step, and not in all."""
+    """Return whether a slot touched in some point of a step beside the run and not in the run.
+
+    Or the other way round.
+    """
     last = len(V.seen) - 1
     for s in range(last):
-        if 0 < V.seen[s] < V.seen[last]:
+        if V.seen[s] != acts(V, scene, s) * V.seen[last]:
             return True
     return False
 
@@ -331,7 +342,7 @@ def pass_change(
     """
     last = last_with(V, t, h, j)
     slot, code = int(V.change[last, SLOT]), transfer(V, scene, t, h, k, (j, last), e)
-    if code != 0 or V.words[STEADY] != 1 or scene.work.touching[slot] == 0:
+    if code != 0 or V.words[STEADY] != 1 or acts(V, scene, slot) == 0:
         return code, later
     at = V.change[last, AT_PART]
     s = touch_later(V, scene, t, h, k, slot, at, e)
@@ -393,7 +404,7 @@ def step_along(
         for i in range(V.next.shape[1]):
             V.work[FIRST, i] = V.slope[k, i]
     for j in range(V.words[CHANGES]):
-        end, begins = V.change[j, AT_PART], scene.work.touching[int(V.change[j, SLOT])] == 1
+        end, begins = V.change[j, AT_PART], acts(V, scene, int(V.change[j, SLOT])) == 1
         if end > until:
             break
         if not is_first(V, t, h, j):

@@ -64,8 +64,10 @@ SPAN, BEHIND = 1e-4, 1e-5
 SURE = 0.01
 #: By how much, over that, what is kept may differ between the run and both sides.
 ALIKE = 0.03
+#: Times are rounded as forces are: the parameter is changed by so much more for them at first.
+WIDER = 10.0
 #: So often a smaller difference is tried for the time of a change; so often farther behind it.
-TRIES, TRIES_BEHIND = 4, 10
+TRIES, TRIES_BEHIND = 6, 10
 #: A jump of f below this part of its size is none; where it is found beside the run itself.
 NONE, JUMP = 1e-9, 1e-6
 #: Rows of `Variations.work`: a point, f there, f with one change less.
@@ -100,7 +102,7 @@ def find_times(V: Variations, scene: Scene, t: float, H: float, k: int, what: in
     With a smaller difference where the run is not in their middle: there times are no straight line
     over the parameter. The one is kept that is the nearest to it, as rounding grows the other way.
     """
-    e, best, found, own = half_step(V, k), math.inf, V.times[k, at], 1.0
+    e, best, found, own = WIDER * half_step(V, k), math.inf, V.times[k, at], 1.0
     if V.words[GONE_OVER] == 1:
         e = V.wide[k]
         own = crossing(V, scene, t - H, H, k, 0.0, what, 1.0)

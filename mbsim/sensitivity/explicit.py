@@ -14,6 +14,7 @@ from mbsim.integrators.dop853 import combined_error
 from mbsim.integrators.scheme import SHOWN, Method, in_workspace
 from mbsim.sensitivity.arrays import (
     ATTEMPT,
+    CORNERS,
     DOWN,
     DOWN_SIDE,
     FIT_DENSE,
@@ -82,8 +83,8 @@ def error_of(V: Variations, up: Method, other: Method, part: float) -> float:
             change = up.k[j, i] - other.k[j, i]
             off += V.estimates[0, j] * change
             low += V.estimates[rows - 1, j] * change
-        first = max(first, part * abs(off) / V.scale[i])
-        second = max(second, part * abs(low) / V.scale[i])
+        first = max(first, part * abs(off) / V.felt[i])
+        second = max(second, part * abs(low) / V.felt[i])
     if rows == 1:
         return first
     return max(combined_error(first, second), LOW_ORDER * first)
@@ -107,6 +108,7 @@ def explicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k:
     if V.words[REMEMBERED] > 0:
         # what friction keeps is another number behind the step
         keep_change(V, k, width, OWN)
+        V.told[k] = V.words[CORNERS]
     else:
         V.smooth[k] = 1
     return 0
@@ -118,8 +120,10 @@ def take_difference(
 ) -> None:
     """Fill derivative k at the end of the step, and its error, from both sides of a difference."""
     up = in_workspace(V.words[UP])[1]
-    whole, last = 1.0 / V.size[k], V.estimates.shape[1] - 1
+    whole, last, apart = 1.0 / V.size[k], V.estimates.shape[1] - 1, 0.0
     for i in range(len(m.y)):
+        first = (up.k[0, i] - other.k[0, i]) / width
+        apart = max(apart, abs(first - V.slope[k, i]) / V.felt[i])
         V.slope[k, i] = (up.k[last, i] - other.k[last, i]) / width
         if len(V.weights) > 0:
             # what is rounded is the change alone
@@ -129,8 +133,11 @@ def take_difference(
             V.next[k, i] = V.d[k, i] + h / width * rise
         else:
             V.next[k, i] = (up.trial[i] - other.trial[i]) / width
-        whole = max(whole, abs(V.next[k, i]) / V.scale[i], abs(V.d[k, i]) / V.scale[i])
+        whole = max(whole, abs(V.next[k, i]) / V.felt[i], abs(V.d[k, i]) / V.felt[i])
     V.error[k] = error_of(V, up, other, abs(h / width) / whole)
+    if V.told[k] == 1:
+        # where f bends between both sides of a difference each is smooth, and neither right
+        V.error[k] = max(V.error[k], h * apart / whole)
 
 
 @jitable

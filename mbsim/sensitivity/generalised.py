@@ -253,7 +253,7 @@ def sharpen(V: Variations, scene: Scene, m: Method, h: float, k: int) -> None:
     whole, most, step = 1.0 / V.size[k], 0.0, h * h
     for i in range(len(m.y)):
         w[i] = 0.0
-        whole = max(whole, abs(V.stage[NEW, i]) / V.scale[i], abs(V.d[k, i]) / V.scale[i])
+        whole = max(whole, abs(V.stage[NEW, i]) / V.felt[i], abs(V.d[k, i]) / V.felt[i])
         if is_rate(m, i):
             a0, a1 = V.stage[BEGIN, i], V.stage[END, i]
             first, last = kept[DOT, i], rate_beside(V, k, i)
@@ -267,9 +267,9 @@ def sharpen(V: Variations, scene: Scene, m: Method, h: float, k: int) -> None:
                 V.stage[NEW, i] += off
                 w[i] = away if m.kinds[i] == VELOCITY else 0.0
                 off, away = step / 12.0 * h * change, step / 24.0 * step * change
-            most = max(most, abs(off) / V.scale[i])
+            most = max(most, abs(off) / V.felt[i])
             if m.kinds[i] == VELOCITY:
-                most = max(most, abs(away) / (own * V.scale[i]))
+                most = max(most, abs(away) / (own * V.felt[i]))
     V.error[k] = most / whole
     as_positions(p, m.trial, w)
     for i in range(len(m.y)):
@@ -290,6 +290,18 @@ def fit_step(V: Variations, m: Method, h: float, k: int) -> None:
         V.next[k, i], V.slope[k, i] = V.stage[NEW, i], last
         V.dense[k, 0, i], V.dense[k, 1, i] = V.d[k, i], rise
         V.dense[k, 2, i], V.dense[k, 3, i] = h * first - rise, 2.0 * rise - h * (first + last)
+
+
+@jitable
+def fit_hermite(V: Variations, m: Method, h: float) -> None:
+    """Fill the cubic polynomial of a step of generalised-alpha, as its `fit_dense` has it."""
+    for i in range(len(m.y)):
+        rate = is_rate(m, i)
+        first = m.kept[DOT, i] if rate else m.k[0, i]
+        last = m.ahead[DOT, i] if rate else m.k[LAST, i]
+        rise = m.trial[i] - m.y[i]
+        V.path[0, i], V.path[1, i] = m.y[i], rise
+        V.path[2, i], V.path[3, i] = h * first - rise, 2.0 * rise - h * (first + last)
 
 
 @jitable

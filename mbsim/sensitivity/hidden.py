@@ -13,7 +13,7 @@ from mbsim.arrays.scene import Scene
 from mbsim.core.address import view
 from mbsim.core.jitable import jitable
 from mbsim.integrators.scheme import TIME, Method
-from mbsim.sensitivity.arrays import ASKED, F_BEFORE, LOST_USER, TWIN, USUAL_CHANGE, Variations
+from mbsim.sensitivity.arrays import ASKED, F_BEFORE, HIDES, TWIN, USUAL_CHANGE, Variations
 from mbsim.sensitivity.timed import (
     BEFORE,
     BEGIN,
@@ -118,5 +118,5 @@ def find_hidden(V: Variations, scene: Scene, m: Method, h: float) -> None:
     at = jump_within(V, scene, m, h)
     for k in range(len(V.size)):
         if not math.isnan(at) and V.lost[k] == math.inf and not stays(V, scene, m, h, at, k):
-            V.reason[k] = LOST_USER
+            V.reason[k] = V.words[HIDES]
     set_parameter(V, view(V.words[TWIN], Scene), scene, 0, 0.0)

@@ -16,8 +16,6 @@ from mbsim.core.arrays import F1, Pointer
 from mbsim.core.codes import Code
 from mbsim.core.jitable import jitable
 from mbsim.core.problem import Problem, Taken
-from mbsim.integrators.galpha_iteration import DOT, LAST
-from mbsim.integrators.positions import is_rate
 from mbsim.integrators.scheme import (
     EVALUATIONS,
     LAST_STEP,
@@ -29,11 +27,10 @@ from mbsim.integrators.scheme import (
     Method,
     in_workspace,
 )
-from mbsim.sensitivity.along import project_end, remember_end, value_within
+from mbsim.sensitivity.along import project_end, remember_end, tell, value_within
 from mbsim.sensitivity.arrays import (
     ALONG,
     ASKED,
-    ASKS_USERS,
     ATTEMPT,
     BEFORE,
     BENT,
@@ -44,15 +41,16 @@ from mbsim.sensitivity.arrays import (
     FIRST,
     FITTED,
     FOLLOWED,
+    HIDES,
     JOINTS,
     LAST_ON,
     LAST_UNTIL,
+    LENGTH,
     LINE_F,
     LINE_Y,
     LOST_FAILED,
     LOST_JUMP,
     LOST_LARGE,
-    LOST_USER,
     LOST_WORK,
     METHOD,
     MOST,
@@ -85,7 +83,7 @@ from mbsim.sensitivity.events import (
     note_shifts,
 )
 from mbsim.sensitivity.explicit import explicit_step, fit_beside, fit_path
-from mbsim.sensitivity.generalised import generalised_step, note_along
+from mbsim.sensitivity.generalised import fit_hermite, generalised_step, note_along
 from mbsim.sensitivity.hidden import find_hidden
 from mbsim.sensitivity.implicit import implicit_step
 from mbsim.sensitivity.later import UNKNOWN, add, add_motion, give_up, go_on, is_steady, pays
@@ -93,6 +91,8 @@ from mbsim.sensitivity.reintegration import hold, make_sure
 from mbsim.sensitivity.stretches import is_too_much
 from mbsim.sensitivity.timed import begin_unseen, clear_time, look_behind, make_room
 from mbsim.sensitivity.twin import (
+    acts,
+    feel,
     half_step,
     is_deep,
     keep_unit,
@@ -157,18 +157,6 @@ def follow(V: Variations, scene: Scene, m: Method, t: float, h: float) -> int:
 
 
 @jitable
-def fit_hermite(V: Variations, m: Method, h: float) -> None:
-    """Fill the cubic polynomial of a step of generalised-alpha, as its `fit_dense` has it."""
-    for i in range(len(m.y)):
-        rate = is_rate(m, i)
-        first = m.kept[DOT, i] if rate else m.k[0, i]
-        last = m.ahead[DOT, i] if rate else m.k[LAST, i]
-        rise = m.trial[i] - m.y[i]
-        V.path[0, i], V.path[1, i] = m.y[i], rise
-        V.path[2, i], V.path[3, i] = h * first - rise, 2.0 * rise - h * (first + last)
-
-
-@jitable
 def own_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k: int) -> int:
     """Fill derivative k at the end of the step as the run's method has it; return a code."""
     if V.close[k] == 1:
@@ -196,7 +184,7 @@ def bent_step(
 ) -> int:
     """Fill derivative k, which is in `own`, at the end of a step in which forces bend."""
     if V.words[ALONG] == 0:
-        V.smooth[k] = 0
+        V.smooth[k] = V.told[k] = 0
     if changes:
         V.ready[k] = 0
     if V.words[ORDERED] == 0:
@@ -210,6 +198,8 @@ def bent_step(
     e = step_along_motion(V, k)
     goes_on, later, V.parts[k] = V.words[ALONG] == 1, V.later[k, LAST_UNTIL], 0
     code, V.later[k, LAST_ON] = step_along(V, scene, t, h, k, (0.0, 1.0), goes_on, later)
+    if not goes_on and not changes:
+        tell(V, k)
     if code == 0 and V.words[JOINTS] == 1 and V.close[k] == 0:
         # next to a jump sides would be put where motions have them at another time
         code = project_end(V, scene, m, t + h, k, e)
@@ -274,6 +264,8 @@ def take_step(V: Variations, scene: Scene, m: Method, t: float, h: float) -> Non
     twin = view(V.words[TWIN], Scene)
     V.words[CHANGES] = V.words[ORDERED] = V.words[PLAIN] = V.words[FOLLOWED] = 0
     V.words[STEADY] = UNKNOWN
+    if V.words[REMEMBERED] > 0:
+        feel(V, scene)
     touches = scene.work.hit[len(scene.work.hit) - 1] > 0
     V.words[MOST] = V.words[WORTH] * len(V.size) * (m.counts[EVALUATIONS] + AT_FIRST)
     listed = len(scene.contacts.id) == 0 or list_changes(V, scene, t, h)
@@ -306,7 +298,7 @@ def rhs_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int:
     V.words[ASKED] += 1
     hit, last = twin.work.hit, len(twin.work.hit) - 1
     for j in range(hit[last]):
-        V.seen[hit[j]] += 1
+        V.seen[hit[j]] += acts(V, twin, hit[j])
     V.seen[last] += 1
     return code
 
@@ -316,7 +308,7 @@ def take_over(V: Variations, t: float, n: int, anew: bool, hops: bool) -> None:
     """Let what was found at the end of a step be committed; `reason` says what is not known."""
     for k in range(len(V.size)):
         if anew:
-            V.smooth[k] = V.ready[k] = 0
+            V.smooth[k] = V.ready[k] = V.told[k] = 0
         for s in range(V.memory.shape[1]):
             for j in range(V.memory.shape[2]):
                 V.before[k, s, j], V.memory[k, s, j] = V.memory[k, s, j], V.end[k, s, j]
@@ -326,7 +318,9 @@ def take_over(V: Variations, t: float, n: int, anew: bool, hops: bool) -> None:
             V.d[k, i] = V.next[k, i]
             if hops:
                 V.d[k, i] += V.fall[k, i]
-            if not abs(V.d[k, i]) * V.size[k] <= LARGEST * V.scale[i]:
+            effect = abs(V.d[k, i]) * V.size[k] / V.scale[i]
+            V.largest[k] = max(V.largest[k], effect)
+            if not effect <= LARGEST:
                 V.reason[k] = LOST_LARGE
         if hops and not math.isfinite(V.fall[k, 0]):
             V.reason[k] = LOST_JUMP
@@ -336,11 +330,11 @@ def take_over(V: Variations, t: float, n: int, anew: bool, hops: bool) -> None:
 
 @jitable
 def lose_hidden(V: Variations, scene: Scene, m: Method, t: float, h: float) -> None:
-    """Lose derivatives by what moves a jump in the step that only a user's function knows of."""
+    """Lose derivatives by what moves a jump within the step, where nothing ends one."""
     find_hidden(V, scene, m, h)
     for k in range(len(V.size)):
         if V.reason[k] != 0.0:
-            lose(V, k, t - h, LOST_USER)
+            lose(V, k, t - h, V.words[HIDES])
             V.reason[k] = 0.0
 
 
@@ -358,11 +352,11 @@ def commit_hook(context: int, t: float, h: float, a: Pointer, b: Pointer) -> int
         V.jump[BEFORE, i], V.jump[F_BEFORE, i] = y[i], f[i]
         V.jump[LINE_Y, i], V.jump[LINE_F, i] = y[i], f[i]
     # of a very short step, as many end at a branch, the polynomial is all rounding
-    V.line[0] = SPAN * m.memory[OWN_TIME]
+    V.line[0], V.line[LENGTH] = SPAN * m.memory[OWN_TIME], h
     V.shift[:] = math.nan
     list_asking(V, scene, switched)
     V.reason[:] = 0.0
-    if V.words[ASKS_USERS] == 1:
+    if V.words[HIDES] != 0:
         lose_hidden(V, scene, m, t, h)
     hops = V.words[TIMED] == 1 and look_for_jumps(V, scene, m, t)
     take_step(V, scene, m, t - h, h)

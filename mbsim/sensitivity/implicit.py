@@ -23,6 +23,7 @@ from mbsim.integrators.radau5 import Z as STAGES_AT
 from mbsim.integrators.scheme import LAST_STEP, Method, in_workspace
 from mbsim.sensitivity.arrays import (
     COLLIDES,
+    CORNERS,
     DOWN_SIDE,
     JOINTS,
     LEFT,
@@ -56,7 +57,7 @@ STAGES = 17
 #: The stage at which the twin is linearised.
 MIDDLE = 1
 #: By how much the error of order 3 overrates that of the step.
-OVERRATED = 100.0
+OVERRATED, ORDER = 100.0, 4.0
 #: What an iteration may leave is less by this while bodies collide: forces turn what is left of
 #: places into speeds. That is while a depth changes by more than such a part of it.
 IN_IMPACT, COLLIDING = 0.02, 1e-6
@@ -306,10 +307,24 @@ def implicit_step(V: Variations, scene: Scene, m: Method, t: float, h: float, k:
     code = estimate_error(V, scene, m, t, h, k, e)
     note_bend(V, m, h, k, V.stage[Z + 2])
     keep_polynomial(V, m, k)
-    V.smooth[k] = 1
+    V.smooth[k], V.told[k] = 1, 0
     if code == 0 and V.words[REMEMBERED] > 0:
         keep_change(V, k, e, OWN)
     return code
+
+
+@jitable
+def overrated(V: Variations, m: Method, h: float, k: int, error: float) -> float:
+    """Return how many times the estimate of an error of order 3 is that of the step.
+
+    None where it has grown by far more than the step: there f bends, and the step is off by as
+    much.
+    """
+    before, V.shown_error[k] = V.shown_error[k], error
+    if V.words[CORNERS] == 0 or V.smooth[k] == 0 or before == 0.0 or not goes_on(m, h):
+        return OVERRATED
+    told = before * max(1.0, h / m.memory[LAST_STEP]) ** ORDER
+    return OVERRATED if error <= SURPRISING * told else 1.0
 
 
 @jitable
@@ -321,7 +336,7 @@ def estimate_error(
     It is the method's own, of order 3: far larger than what the step is off by.
     """
     p, twin = in_workspace(V.words[UP])[0], view(V.words[TWIN], Scene)
-    r, x, f = V.stage[REAL], V.stage[POINT], V.stage[SLOPE]
+    r, x, f, apart = V.stage[REAL], V.stage[POINT], V.stage[SLOPE], 0.0
     for i in range(len(m.y)):
         r[i] = 0.0
         for j in range(3):
@@ -338,16 +353,20 @@ def estimate_error(
         if code != 0:
             return code
         for i in range(len(m.y)):
-            r[i] += (f[i] - m.k[0, i]) / e
+            first = (f[i] - m.k[0, i]) / e
+            r[i] += first
+            if V.told[k] == 1:
+                # f may bend between both sides of a difference
+                apart = max(apart, abs(first - V.slope[k, i]) / V.felt[i])
     if V.words[JOINTS] == 1:
         put_along(p, m, t, m.y, r, x)
     code = call_int(p.solve, (p.context, t, h, r, V.stage[REAL_D]))
     error, whole = 0.0, 1.0 / V.size[k]
     for i in range(len(m.y)):
         end = V.d[k, i] + V.stage[Z + 2, i]
-        error = max(error, abs(V.stage[REAL_D, i]) / V.scale[i])
-        whole = max(whole, abs(end) / V.scale[i], abs(V.d[k, i]) / V.scale[i])
-    V.error[k] = error / whole / OVERRATED
+        error = max(error, abs(V.stage[REAL_D, i]) / V.felt[i])
+        whole = max(whole, abs(end) / V.felt[i], abs(V.d[k, i]) / V.felt[i])
+    V.error[k] = max(error / overrated(V, m, h, k, error / whole), h * apart) / whole
     return code
 
 

@@ -138,4 +138,4 @@ def give_up(V: Variations, k: int) -> None:
     """Carry D itself from here on: slopes that are known are those of D + s f."""
     if V.later[k, LAST_ON] != 0.0:
         V.later[k, LAST_ON] = 0.0
-        V.smooth[k] = V.ready[k] = 0
+        V.smooth[k] = V.ready[k] = V.told[k] = 0

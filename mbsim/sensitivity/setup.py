@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbsim.arrays.codes import SCALE_LENGTH, SCALE_SPEED
 from mbsim.arrays.hooks import Hook
 from mbsim.core import jit, tags
 from mbsim.core.address import pack
-from mbsim.core.problem import HOOK, VELOCITY
+from mbsim.core.problem import HOOK
 from mbsim.dynamics.bodies import configuration
 from mbsim.integrators import scheme
 from mbsim.results.blocks import Block, Gathered
@@ -26,8 +25,8 @@ from mbsim.sensitivity.hooks import AT, commit_hook, output_hook, rhs_hook
 from mbsim.sensitivity.implicit import STAGES
 from mbsim.sensitivity.parameters import SURFACE, Direction, replaced, weighed
 from mbsim.sensitivity.reintegration import MOTIONS
+from mbsim.sensitivity.sizes import breaks, enough, one_sided, scale, steps
 from mbsim.sensitivity.timed import SIDES
-from mbsim.sensitivity.twin import STEP, STEP_OF_CONTACTS
 
 if TYPE_CHECKING:
     from mbsim.compile_model.build import System
@@ -39,25 +38,12 @@ _OWN_STATE = (
     "log/", "audit/", "rows/", "state/memory", "state/before", "state/chattering",
     "work/friction_slope",
 )  # fmt: skip
-#: The error of a step of a derivative may be this part of it, or so many tol; where friction
-#: remembers.
-ENOUGH, ENOUGH_TOL, ENOUGH_OF_MEMORY = 1e-9, 10.0, 30.0
-#: Those of GALPHA, whose steps are many, over those of others: of a step where bodies collide, and
-#: of what an iteration may leave where friction remembers.
-ENOUGH_OFTEN, LEFT_OFTEN = 0.3, 0.1
-#: What an iteration may leave, over the error of a step; where there are contacts, as when they
-#: touch follows from it; of a derivative, where friction remembers: when that sticks and slips
-#: follows from depths, which are far smaller than the model.
-LEFT, LEFT_OF_CONTACTS, LEFT_OF_MEMORY = 0.3, 0.05, 3e-10
-#: What parts of usual steps of differences, of the least ones, and of what depths allow those to
-#: one side take; and of usual steps those to both sides along a step.
-#: GALPHA takes many short steps, and looks at how D' changes from one to the next. Where friction
-#: remembers stiff springs turn rounding of y into forces: more than wider differences are off by.
-ONE_SIDED, ONE_SIDED_IN_IMPACTS = (3.0, 1.0, 1.0, 1.0), (1.0, 0.1, 0.3, 1.0)
-ONE_SIDED_OFTEN, ONE_SIDED_OFTEN_IN_IMPACTS = (0.1, 0.1, 1.0, 1.0), (1.0, 0.1, 0.1, 1.0)
-ONE_SIDED_OF_MEMORY = (100.0, 1.0, 1.0, 30.0)
+#: What a derivative is off by in the end, over what the error of a step of it may be in usual
+#: sizes; what part of its largest value that may be, or a run says so of what changes the motion by
+#: less than so much of usual sizes.
+UNSEEN, KNOWN_TO, LITTLE = 10.0, 1e-4, 1e-2
 #: What is one whole number of each parameter.
-_FLAGS = ("stale", "bend_known", "ready", "bends", "bent", "close", "fifth")
+_FLAGS = ("stale", "bend_known", "ready", "bends", "bent", "close", "fifth", "told")
 #: What is no signal of the motion.
 _NO_SIGNALS = ("time", "state/", "contact_points/", "events")
 _WHY = {
@@ -137,7 +123,8 @@ class Sensitivities:
         self.arrays = self._arrays(y, np.array(starts), tol)
         self.arrays.words[at.WORTH] = worth
         self._users = _users(system)
-        self.arrays.words[at.ASKS_USERS] = int(bool(self._users))
+        jumps = bool(np.any(system.scene.switching.jumps == 1))
+        self.arrays.words[at.HIDES] = at.LOST_USER if self._users else at.LOST_JUMP if jumps else 0
         self.arrays.words[at.TIMED] = int(follows_time(system.scene))
         self.arrays.gap[at.LAST], self.arrays.gap[at.UNTIL] = -math.inf, start
         self._pack()
@@ -192,9 +179,7 @@ class Sensitivities:
             path=np.zeros((0, n)),
             work=np.zeros((WORK, n)),
             error=np.zeros(count),
-            enough=_enough(self.system, tol),
-            rate=np.full(count, 0.99),
-            moved=np.zeros(count),
+            enough=enough(self.system, tol),
             carried=np.zeros((count, 4, n)),
             bend=np.zeros((count, n)),
             jump=np.zeros((5, n)),
@@ -204,11 +189,12 @@ class Sensitivities:
             reach=np.zeros(count),
             depth=np.zeros((3, shape[0])),
             odd=np.zeros((2, shape[0]), dtype=np.int64),
-            line=np.zeros(8),
+            line=np.zeros(9),
             shift=np.zeros((count, shape[0] + 1)),
             times=np.zeros((count, shape[0] + 1, 3)),
             asks=np.zeros(shape[0] + 1, dtype=np.int64),
             reason=np.zeros(count),
+            breaks=breaks(self.system),
             seen=np.zeros(len(scene.state.touching) + 1, dtype=np.int64),
             own=np.zeros(n),
             kept=np.zeros((count, n)),
@@ -219,10 +205,11 @@ class Sensitivities:
             lasted=np.zeros(count),
             change=np.zeros((at.MOST_CHANGES, 4)),
             row=np.zeros((4, n)),
-            one_sided=_one_sided(self.system),
-            scale=_scale(self.system, n),
-            jumping=_scale(self.system, n, jumping=True),
-            room=_scale(self.system, n) * _steps(self.system, n),
+            one_sided=one_sided(self.system),
+            scale=scale(self.system, n),
+            felt=scale(self.system, n),
+            jumping=scale(self.system, n, jumping=True),
+            room=scale(self.system, n) * steps(self.system, n),
             weights=np.zeros(0),
             estimates=np.zeros((1, 0)),
             held=np.concatenate(([0, 0], np.arange(held))),
@@ -295,12 +282,13 @@ class Sensitivities:
         words[at.FITTED] = 0
         joints = words[at.JOINTS] == 1
         self.arrays = self.arrays._replace(
-            enough=_enough(self.system, self._tol, words[at.ALONG] == 1),
-            one_sided=_one_sided(self.system, words[at.ALONG] == 1),
+            enough=enough(self.system, self._tol, words[at.ALONG] == 1),
+            one_sided=one_sided(self.system, words[at.ALONG] == 1),
             weights=np.zeros(0) if joints or running.implicit else _weights(running),
             estimates=np.zeros((1, 0)) if running.implicit else _estimates(running),
             smooth=np.zeros(len(self.directions), dtype=np.int64),
             ready=np.zeros(len(self.directions), dtype=np.int64),
+            told=np.zeros(len(self.directions), dtype=np.int64),
         )
         if self.arrays.dense.shape[1] != running.dense:
             self.arrays = self.arrays._replace(
@@ -368,10 +356,16 @@ class Sensitivities:
                 "value": direction.value,
                 "steps_along": int(self.arrays.words[at.BENT]),
                 "evaluations": int(self.arrays.words[at.ASKED]),
+                "known_to": float(self._known_to[k]),
                 "known_until": float(self.arrays.lost[k]),
                 "why": self._why(int(self.arrays.why[k])),
             }
         return found, about
+
+    @property
+    def _known_to(self) -> Array:
+        """What derivatives may be off by, over their largest value: errors are of usual sizes."""
+        return UNSEEN * self.arrays.enough[0] / np.maximum(self.arrays.largest, 1e-300)
 
     def _why(self, code: int) -> str:
         """Return why a derivative is not known, and which subroutines it may be for."""
@@ -380,8 +374,16 @@ class Sensitivities:
 
     @property
     def lines(self) -> list[str]:
-        """What is to be said of derivatives that are not known to the end."""
-        return [
+        """What is to be said of derivatives that are not known to the end, or not well."""
+        small = [
+            f"warning: sensitivity to {direction.name}: it changes the motion so little that it is "
+            f"known to {part:.1g} of its largest value; a smaller tol tells more"
+            for direction, part, effect in zip(
+                self.directions, self._known_to, self.arrays.largest, strict=True
+            )
+            if part > KNOWN_TO and 0.0 < effect < LITTLE
+        ]
+        return small + [
             f"warning: sensitivity to {direction.name}: not known from time {lost:.6g} on: "
             f"{self._why(int(why))}"
             for direction, lost, why in zip(
@@ -394,6 +396,10 @@ class Sensitivities:
 def _of_jumps(count: int, n: int) -> dict[str, Any]:
     """Return arrays of `timed` and of rows, for so many parameters and numbers of y; `_FLAGS`."""
     return {name: np.zeros(count, dtype=np.int64) for name in _FLAGS} | {
+        "shown_error": np.zeros(count),
+        "largest": np.zeros(count),
+        "rate": np.full(count, 0.99),
+        "moved": np.zeros(count),
         "gap": np.full(3, math.nan),
         "moves": np.zeros((count, 2)),
         "shown": np.zeros((count, 2)),
@@ -401,36 +407,6 @@ def _of_jumps(count: int, n: int) -> dict[str, Any]:
         "fall": np.zeros((count, n)),
         "sides": np.zeros((SIDES, n)),
     }
-
-
-def _collides(system: System) -> bool:
-    """Return whether there are contacts, and no friction that remembers."""
-    return bool(system.contact_ids) and system.scene.state.memory.shape[1] == 0
-
-
-def _enough(system: System, tol: float, often: bool = False) -> Array:
-    """Return what the error of a step may be, and what an iteration may leave.
-
-    Steps are many and short where they are taken `often`.
-    """
-    if system.scene.state.memory.shape[1]:
-        enough = max(ENOUGH, ENOUGH_OF_MEMORY * tol)
-        return np.array((enough, LEFT_OF_MEMORY * (LEFT_OFTEN if often else 1.0)))
-    enough = max(ENOUGH, ENOUGH_TOL * tol)
-    left = enough * (LEFT_OF_CONTACTS if system.contact_ids else LEFT)
-    return np.array((enough * (ENOUGH_OFTEN if often and _collides(system) else 1.0), left))
-
-
-def _one_sided(system: System, often: bool = False) -> Array:
-    """Return what parts of usual steps of differences those to one side take.
-
-    Steps are many and short where they are taken `often`.
-    """
-    if system.scene.state.memory.shape[1]:
-        return np.array(ONE_SIDED_OF_MEMORY)
-    if _collides(system):
-        return np.array(ONE_SIDED_OFTEN_IN_IMPACTS if often else ONE_SIDED_IN_IMPACTS)
-    return np.array(ONE_SIDED_OFTEN if often and not system.contact_ids else ONE_SIDED)
 
 
 def _users(system: System) -> list[str]:
@@ -448,15 +424,6 @@ def _part(block: Block, rows: slice) -> Block:
     return Block(**{name: table[rows] for name, table in fields.items()} | without)
 
 
-def _steps(system: System, n: int) -> Array:
-    """Return half of the step of a difference in usual sizes of every number of y."""
-    found = np.full(n, STEP)
-    if system.contact_ids:
-        kinds = np.array(configuration.kinds(len(system.body_ids), n))
-        found[kinds != VELOCITY] = STEP_OF_CONTACTS
-    return found
-
-
 def _weights(running: scheme.Scheme) -> Array:
     """Return by what weights an explicit method adds up its stages."""
     from mbsim.integrators import dop853, dopri5
@@ -464,25 +431,6 @@ def _weights(running: scheme.Scheme) -> Array:
     if running is dop853.SCHEME:
         return np.array(dop853.A[12][:12])
     return np.array((dopri5.B1, 0.0, dopri5.B3, dopri5.B4, dopri5.B5, dopri5.B6))
-
-
-def _scale(system: System, n: int, jumping: bool = False) -> Array:
-    """Return the usual size of every number of y; of what only sums up none is needed.
-
-    What laws integrate counts for jumps of f alone: a bristle's stretch grows from the touch on.
-    """
-    scale = system.scene.world.scale
-    length, speed = float(scale[SCALE_LENGTH]), float(scale[SCALE_SPEED])
-    of_a_body = [length] * 3 + [0.5] * 4 + [speed] * 3 + [speed / length] * 3
-    found = np.full(n, math.inf)
-    found[: len(of_a_body) * len(system.body_ids)] = of_a_body * len(system.body_ids)
-    states = np.asarray(system.scene.states.offset, dtype=np.int64)
-    found[states] = np.maximum(system.scene.states.scale, 1e-300)
-    # what friction carries is a stretch or a way over one, and follows the slip as exactly
-    for places in (system.scene.slots.x, system.scene.slots.z)[: 2 if jumping else 1]:
-        for first in places[places >= 0]:
-            found[first : first + 2] = length
-    return found
 
 
 def _estimates(running: scheme.Scheme) -> Array:

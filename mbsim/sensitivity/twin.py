@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import math
 
+from mbsim.arrays.codes import SCALE_SPEED
 from mbsim.arrays.scene import Scene
 from mbsim.core.arrays import F1, F2
 from mbsim.core.jitable import jitable
 from mbsim.core.layout import BODY_SIZE
 from mbsim.core.memory import floats_at
-from mbsim.dynamics.contact.forces import BRANCH, DEPTH
+from mbsim.dynamics.contact.forces import BRANCH, DEPTH, NORMAL, UNIT, contact_of
 from mbsim.integrators.scheme import STEPS, Method
-from mbsim.laws.catalog import UNDECIDED
-from mbsim.sensitivity.arrays import AGAIN, ODD, REMEMBERED, SET, UP_SIDE, Variations
+from mbsim.laws.catalog import LASTS, UNDECIDED
+from mbsim.sensitivity.arrays import AGAIN, CORNERS, ODD, REMEMBERED, SET, UP_SIDE, Variations
 
 #: Half of the step of differences, in usual sizes of the parameter and of y.
 STEP = 1e-6
@@ -36,7 +37,9 @@ def half_step(V: Variations, k: int) -> float:
 @jitable
 def step_along_motion(V: Variations, k: int) -> float:
     """Return by how much parameter k is changed to either side along a step."""
-    return V.shrink[k] * part_of_step(V, k, V.one_sided[3], 1.0, 1.0)
+    # where slip turns round both sides do so at different times, between which D' is neither
+    part = V.one_sided[3] if V.words[CORNERS] == 0 else 1.0
+    return V.shrink[k] * part_of_step(V, k, part, 1.0, 1.0)
 
 
 @jitable
@@ -118,6 +121,45 @@ def half_with_jump(V: Variations, rows: F2, at: tuple[int, int, int], whole: flo
     for i in range(rows.shape[1]):
         rows[row, i] = rows[middle, i]
     return half
+
+
+@jitable
+def acts(V: Variations, scene: Scene, s: int) -> int:
+    """Return 1 if slot s touches where a scene was evaluated last, 0 if not.
+
+    Where its friction jumps as nothing presses any more it does no longer count as touching then,
+    as where damping has brought the normal force to zero while it is still deep.
+    """
+    if scene.work.touching[s] == 0:
+        return 0
+    breaks = V.breaks[contact_of(scene, s)] == 1
+    return 1 if not breaks or scene.work.slot[s, NORMAL] > 0.0 else 0
+
+
+@jitable
+def has_acted(V: Variations, scene: Scene, s: int) -> int:
+    """Return the same of the committed state."""
+    if scene.state.touching[s] == 0:
+        return 0
+    return 1 if V.breaks[contact_of(scene, s)] == 0 or scene.state.normal[s] > 0.0 else 0
+
+
+@jitable
+def feel(V: Variations, scene: Scene) -> None:
+    """Let errors of what friction carries count as the velocities of the same energy.
+
+    Forces of stiff springs make these of it, in steps to come. Not of friction that tells stick
+    from slip: steps end where that changes, and it bends nowhere within one.
+    """
+    hit, V.words[CORNERS] = scene.work.hit, 0
+    for j in range(hit[len(hit) - 1]):
+        s = hit[j]
+        unit = scene.work.slot[s, UNIT] / LASTS if scene.state.mode[s] == 0.0 else 0.0
+        if unit > 0.0:
+            V.words[CORNERS] = 1
+        for i in range(scene.contacts.carried[contact_of(scene, s)]):
+            at = scene.slots.z[s] + i
+            V.felt[at] = scene.world.scale[SCALE_SPEED] / unit if unit > 0.0 else math.inf
 
 
 @jitable
