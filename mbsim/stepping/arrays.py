@@ -40,6 +40,8 @@ KEPT_POINT, KEPT_NORMAL, KEPT_TANGENT, KEPT_FORCE = 12, 15, 18, 21
 # from the cg of I, then J
 KEPT_ARMS = 24
 KEPT_COLUMNS = 30
+# of `Points.was`: no such row; nor that, but points of its pair that stuck
+NOT_KEPT, BESIDE_STUCK = -1, -2
 # entries of `Plan.number`: 1 where the error of steps is not estimated; 1 where some kind of pair
 # is not near; part of a step's jumps that the solver may leave; 1 where bodies at rest may sleep;
 # the tolerance
@@ -180,7 +182,7 @@ class Points(NamedTuple):
     body: I2  # (m, 2) I's and J's
     key: I1  # (m,) of its pair of graphics, whose points follow each other
     row: I1  # (m,) of the pair
-    was: I1  # (m,) row of `Kept` that is the same point, -1 for none
+    was: I1  # (m,) row of `Kept` that is the same point; NOT_KEPT, BESIDE_STUCK for none
     gap: F1  # (m,)
     slop: F1  # (m,) depth at which a step may leave it, see `points.slop_of`
     point: F2  # (m, 3)

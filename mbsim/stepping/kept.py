@@ -13,6 +13,7 @@ from mbsim.core.jitable import jitable
 from mbsim.core.rotation import add, cross, dot, scale, sub, vector
 from mbsim.dynamics.contact.forces import sides
 from mbsim.stepping.arrays import (
+    BESIDE_STUCK,
     KEPT_ARMS,
     KEPT_BODY_I,
     KEPT_BODY_J,
@@ -29,6 +30,7 @@ from mbsim.stepping.arrays import (
     KEPT_STAYS,
     KEPT_STICKS,
     KEPT_TANGENT,
+    NOT_KEPT,
     POINTS,
     SLEEPING_ROWS,
     STEP_LENGTH,
@@ -109,8 +111,10 @@ def match_pair(S: Stepping, begin: int, end: int) -> None:
     while last < kept.count[0] and kept.key[last] == P.key[begin]:
         kept.table[last, KEPT_STAYS] = 0.0
         last += 1
+    sticks = first < last and kept.table[first, KEPT_STICKS] == 1.0
+    none = BESIDE_STUCK if sticks else NOT_KEPT
     for k in range(begin, end):
-        P.was[k] = -1
+        P.was[k] = none
         for row in range(first, last):
             if kept.table[row, KEPT_ROW] == P.row[k]:
                 P.was[k] = row
@@ -118,8 +122,8 @@ def match_pair(S: Stepping, begin: int, end: int) -> None:
     for k in range(begin, end):
         if P.was[k] < 0 and first < last:
             row = nearest_kept(S, k, first, last)
-            P.was[k] = row
             if row >= 0:
+                P.was[k] = row
                 kept.table[row, KEPT_STAYS] = 1.0
 
 

@@ -14,9 +14,11 @@ from mbsim.dynamics.contact.forces import IGNORE_DEEPER, sides
 from mbsim.geometry.catalog import AT_DEPTH, AT_NORMAL, AT_POINT, AT_WEIGHT
 from mbsim.stepping.arrays import (
     AXES,
+    KEPT_STICKS,
     LEFT,
     LENGTH,
     LIGHT,
+    NOT_KEPT,
     POINTS,
     SLOP,
     SPIN,
@@ -172,9 +174,11 @@ def put_three(row: F1, at: int, a: V3, b: V3, c: V3) -> None:
 def common_spin(S: Stepping, k: int) -> V3:
     """Return the spin of what bears at point k: that of both bodies, or of the one that turns less.
 
-    Contacts are solved as that sees them: on a turntable as on a table that stands.
+    What sticks is solved as that sees it: on a turntable as on a table that stands.
     """
-    P, v = S.points, S.motion.before
+    P, v, was = S.points, S.motion.before, S.points.was[k]
+    if was == NOT_KEPT or (was >= 0 and S.kept.table[was, KEPT_STICKS] == 0.0):
+        return 0.0, 0.0, 0.0
     a, b = vector(v[P.body[k, 0]], 3), vector(v[P.body[k, 1]], 3)
     of_a, of_b = dot(a, a), dot(b, b)
     if of_a == 0.0 or of_b == 0.0:

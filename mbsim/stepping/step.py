@@ -166,12 +166,12 @@ def prepare_points(scene: Scene, S: Stepping, h: float) -> int:
     P, M = S.points, S.motion
     count, begin = S.tally.count[POINTS], 0
     begin_answers(S)
+    recall(S, h)
     for k in range(count):
         if not fill_point(scene, S, k, begin, h):
             return Code.MANY_POINTS
         begin += P.many[k] if P.wide[k] >= 0 else 0
     fill_answers(scene, S)
-    recall(S, h)
     M.still[0] = 0
     if count > 0:
         find_still(scene, S, h)
