@@ -91,7 +91,7 @@ def begin_friction(S: Stepping, count: int, h: float) -> None:
                 fastest = max(fastest, slip_before(S, end))
             end += 1
         for k in range(begin, end):
-            slip = slip_before(S, k)
+            slip = 0.0 if stuck(S, k) else slip_before(S, k)
             if fastest >= 0.0 and slip <= FASTER * fastest + noise_of(S, group_at(S, k), h):
                 slip = 0.0
             P.holds[k] = coefficient(S, P.contact[k], slip)
